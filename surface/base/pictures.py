@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
-MOST_PIXELS = 4096 * 4096  # of a texture that is decoded; each takes 4 bytes
-DAMAGED = (OSError, ValueError, SyntaxError, LookupError, EOFError, ArithmeticError, struct.error, zlib.error)
+MAX_PIXELS = 4096 * 4096  # of a texture that is decoded; each takes 4 bytes
+DECODING_ERRORS = (OSError, ValueError, SyntaxError, LookupError, EOFError, ArithmeticError, struct.error, zlib.error)
 """What Pillow raises for damaged pictures."""
 
 
-def decoded(data: bytes, most: int = MOST_PIXELS) -> Any:
+def decoded(data: bytes, most: int = MAX_PIXELS) -> Any:
     """Return a whole picture as a Pillow image with 8 bits a channel.
 
     Raises ValueError, which says what is wrong: it is damaged, or has more than ``most`` pixels. ImportError: Pillow
@@ -30,7 +30,7 @@ def decoded(data: bytes, most: int = MOST_PIXELS) -> Any:
             return eight_bits(image)
     except UnidentifiedImageError as error:
         raise ValueError("no picture of a kind that can be read") from error  # Pillow's words name an object in memory
-    except (*DAMAGED, Image.DecompressionBombError) as error:
+    except (*DECODING_ERRORS, Image.DecompressionBombError) as error:
         raise ValueError(str(error) or type(error).__name__) from error
 
 

@@ -26,7 +26,7 @@ from surface.head.model.placement import Placement
 from surface.readers.meshdata import Material
 
 CREASE_DEG = 55.0  # faces that meet at a sharper angle do not share their normals
-MOST_PAIRS = 20_000_000  # of corners of faces at one vertex; a mesh with more gets smooth normals
+MAX_PAIRS = 20_000_000  # of corners of faces at one vertex; a mesh with more gets smooth normals
 PAIRS_AT_ONCE = 1_000_000  # that are held in memory together, 100 bytes each; a vertex with more gets smooth normals
 ROUND = 1.6  # of hair: weight of directions from the middle of the head beside its cards' own normals
 SKULL = np.array([0.0, -15.0, -75.0])  # from the middle of the eyes to that of the hair, mm, on a head of usual size
@@ -218,7 +218,7 @@ def corner_normals(points: Floats, tri: Ints) -> Floats:
     order = np.argsort(tri.ravel(), kind="stable")
     _, first, count = np.unique(tri.ravel()[order], return_index=True, return_counts=True)
     pairs = np.cumsum(count.astype(float) ** 2)
-    if pairs[-1] > MOST_PAIRS or count.max() ** 2 > PAIRS_AT_ONCE:
+    if pairs[-1] > MAX_PAIRS or count.max() ** 2 > PAIRS_AT_ONCE:
         return _smooth(points, tri, face)
     out = np.zeros((tri.size, 3))
     for runs in np.split(np.arange(len(count)), np.flatnonzero(np.diff(pairs // PAIRS_AT_ONCE)) + 1):

@@ -9,7 +9,7 @@ import numpy as np
 
 from surface.base.arrays import Bools, Ints
 from surface.fit.source.kinds import listed
-from surface.head.model.accessories import MAX_NAME, MAX_TRIANGLES, MAX_VERTICES, MOST, Accessory, fault_of
+from surface.head.model.accessories import MAX_ACCESSORIES, MAX_NAME, MAX_TRIANGLES, MAX_VERTICES, Accessory, fault_of
 
 ARRAYS = ("vertices", "normals", "uv", "shade")
 """Of an accessory, with a row for each vertex."""
@@ -36,16 +36,18 @@ def within_limits(found: list[Accessory]) -> Limited:
     pieces = [Piece(_named(part), (one.name,)) for one in found for part in _cut(one)]
     faults = [fault_of(piece.accessory) for piece in pieces]
     good = [piece for piece, fault in zip(pieces, faults, strict=True) if not fault]
-    kept = _joined(good) if len(good) > MOST else good
-    lost = dict.fromkeys(name for piece in kept[MOST:] for name in piece.names)
+    kept = _joined(good) if len(good) > MAX_ACCESSORIES else good
+    lost = dict.fromkeys(name for piece in kept[MAX_ACCESSORIES:] for name in piece.names)
     notes = [f"left out, because it could not be read again: {fault}" for fault in dict.fromkeys(faults) if fault]
-    notes += [f"pieces of the same look are joined, {MOST} accessories are the most"] * (len(kept) < len(good))
-    notes += [f"left out, {MOST} accessories are the most: {listed([*lost])}"] * bool(lost)
+    notes += [f"pieces of the same look are joined, {MAX_ACCESSORIES} accessories are the most"] * (
+        len(kept) < len(good)
+    )
+    notes += [f"left out, {MAX_ACCESSORIES} accessories are the most: {listed([*lost])}"] * bool(lost)
     cut = dict.fromkeys(one.name for one in found if len(one.name) > MAX_NAME)
     notes += [f"names cut to {MAX_NAME} letters: {listed([_short(name) for name in cut])}"] * bool(cut)
-    still = {name for piece in kept[:MOST] for name in piece.names}
+    still = {name for piece in kept[:MAX_ACCESSORIES] for name in piece.names}
     gone = [name for name in dict.fromkeys(one.name for one in found) if name not in still]
-    return Limited(tuple(piece.accessory for piece in kept[:MOST]), notes, gone)
+    return Limited(tuple(piece.accessory for piece in kept[:MAX_ACCESSORIES]), notes, gone)
 
 
 def some_triangles(accessory: Accessory, which: Bools | Ints) -> Accessory:

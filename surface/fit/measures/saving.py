@@ -47,7 +47,7 @@ def _put_aside(files: Sequence[Path]) -> Iterator[None]:
     aside = {file: file.with_name(file.name + ASIDE) for file in files}
     moved = list[Path]()
     try:
-        with _told(files[0].parent):
+        with _as_head_errors(files[0].parent):
             for file in filter(Path.exists, files):
                 file.replace(aside[file])
                 moved.append(file)
@@ -56,13 +56,13 @@ def _put_aside(files: Sequence[Path]) -> Iterator[None]:
         for file in moved:
             aside[file].replace(file)
         raise
-    with _told(files[0].parent):
+    with _as_head_errors(files[0].parent):
         for file in aside.values():
             file.unlink(missing_ok=True)
 
 
 @contextmanager
-def _told(folder: Path) -> Iterator[None]:
+def _as_head_errors(folder: Path) -> Iterator[None]:
     """Raise HeadFileError for an error of the system."""
     try:
         yield

@@ -22,7 +22,7 @@ GROWTH = 1.8  # most points of a part, relative to those it had
 SHARE = 0.6  # of the points that are left to be added, how many a round adds
 ENOUGH_MM = 0.25  # RMS error around a control point up to which it is not split
 CLOSEST_MM = 3.0  # least distance of the knots of a point that is split: finer ones would follow a scanner's noise
-LEAST_SHARE = 0.04  # of a place, that a control point has to be counted there
+MIN_SHARE = 0.04  # of a place, that a control point has to be counted there
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def too_far_apart(part: PartData, basis: csr_matrix, error: Floats, points: Floa
     """
     span, n = _spans_mm(part, points), len(points)
     shares = basis.tocsr()
-    kept = shares.data > LEAST_SHARE
+    kept = shares.data > MIN_SHARE
     row = np.repeat(np.arange(shares.shape[0]), np.diff(shares.indptr))[kept]
     column, share = shares.indices[kept], shares.data[kept]
     finest = np.full(shares.shape[0], np.inf)

@@ -31,7 +31,7 @@ POSES: tuple[dict[str, float], ...] = (
 )
 STEP_MM = 0.4  # size of a pixel in which skin and lining are compared
 BEHIND_MM = 1.0  # least distance of the lining behind the skin
-MOST_MM = 8.0  # what is further before the skin than this has nothing to do with it
+MAX_BEFORE_MM = 8.0  # what is further before the skin than this has nothing to do with it
 TOLD_MM = 0.05  # no remark is made on less, which would be called 0.0 mm
 ROUNDS, GAIN = 6, 1.5  # of moving control points; each moves them by so much more than is missing
 
@@ -84,7 +84,7 @@ def _lack(posed: Head, lips: str, lining: SkinPart) -> Floats:
     front, inside = (view.draw([(part.vertices, part.triangles)]) for part in (skin, lining))
     both = (front.parts != NOTHING) & (inside.parts != NOTHING)
     before = np.where(both, inside.depth, 0.0) - np.where(both, front.depth, 0.0) + BEHIND_MM
-    rows, columns = np.nonzero(both & (before > 0.0) & (before < MOST_MM))
+    rows, columns = np.nonzero(both & (before > 0.0) & (before < MAX_BEFORE_MM))
     lack = np.zeros(len(at))
     for corner in lining.triangles[inside.rows[rows, columns]].T:
         np.maximum.at(lack, corner, before[rows, columns])

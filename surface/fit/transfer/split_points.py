@@ -24,15 +24,15 @@ from surface.head.posing.rig import jaw_path
 Knots = tuple[float, ...]
 Name = tuple[Knots, Knots, int]
 SAME = 9  # decimals to which equal knots agree
-LEAST_MM = 1e-4  # displacements of points that are smaller are dropped
-LEAST_SPAN = 10.0**-SAME
+MIN_MOVE_MM = 1e-4  # displacements of points that are smaller are dropped
+MIN_SPAN = 10.0**-SAME
 
 
 @lru_cache(maxsize=20_000)
 def halved(knots: Knots) -> dict[Knots, float]:
     """Knots of the cubic blending functions with half the spans, and their shares of the one over ``knots``, five."""
     shares = {knots: 1.0}
-    for new in [0.5 * (a + b) for a, b in pairwise(knots) if b - a > LEAST_SPAN]:
+    for new in [0.5 * (a + b) for a, b in pairwise(knots) if b - a > MIN_SPAN]:
         finer: dict[Knots, float] = defaultdict(float)
         for old, share in shares.items():
             for each, part in _inserted(old, new).items():
@@ -121,5 +121,5 @@ def _split_group(group: Group, mix: csr_matrix, more: Floats | None) -> Group:
     field = np.zeros((mix.shape[1], 3))
     field[group.ids] = group.moves
     moves = mix @ field + (0.0 if more is None else more)
-    ids = np.flatnonzero(np.abs(moves).max(axis=1) > LEAST_MM)
+    ids = np.flatnonzero(np.abs(moves).max(axis=1) > MIN_MOVE_MM)
     return Group(group.name, ids.astype(np.int32), moves[ids].astype(np.float32))

@@ -21,7 +21,7 @@ KINDS = ("hair", "hat", "glasses", "jewellery")
 ALPHA = ("OPAQUE", "MASK", "BLEND")
 PICTURES = {b"\x89PNG": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 """Kinds of pictures that may be a texture, by their first bytes: those that every reader of glTF knows."""
-MOST, MAX_NAME = 256, 256  # accessories of a head, and letters of a name
+MAX_ACCESSORIES, MAX_NAME = 256, 256  # accessories of a head, and letters of a name
 MAX_VERTICES, MAX_TRIANGLES = 400_000, 1_000_000  # of one accessory
 LARGE_MM = 1e5  # no vertex lies further out
 TABLES = ("names", "kinds", "alphas", "colours", "cutoffs", "two_sided")
@@ -142,8 +142,8 @@ def _words(arrays: Mapping[str, Array], key: str) -> list[str]:
     words = arrays[key]
     if words.ndim != 1 or words.dtype.kind != "U":
         raise ValueError(f"{key} is no list of words")
-    if len(words) > MOST:
-        raise ValueError(f"{key} are {len(words)}, {MOST} are the most")
+    if len(words) > MAX_ACCESSORIES:
+        raise ValueError(f"{key} are {len(words)}, {MAX_ACCESSORIES} are the most")
     if words.itemsize > 4 * MAX_NAME:  # 4 bytes a letter
         raise ValueError(f"{key} have {words.itemsize // 4} letters, {MAX_NAME} are the most")
     return [str(word) for word in words]

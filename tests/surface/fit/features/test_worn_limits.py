@@ -39,7 +39,7 @@ def test_very_many_pieces_are_joined_where_they_look_alike(tmp_path: Path) -> No
 
 
 def test_a_texture_that_ends_at_its_edge_is_not_joined_with_one_that_repeats(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(worn_limits, "MOST", 2)
+    monkeypatch.setattr(worn_limits, "MAX_ACCESSORIES", 2)
     found = [card(), card(), replace(card(), uv=card().uv + np.float32(0.5))]
     assert [one.repeats for one in within_limits(found).accessories] == [False, True]
 
@@ -55,10 +55,10 @@ def test_those_beyond_the_most_that_look_different_are_left_out() -> None:
 def test_a_large_one_is_cut_and_its_pieces_are_not_joined_again(limit: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(worn_limits, "MAX_VERTICES", 3)
     monkeypatch.setattr(worn_limits, limit, 3 if limit == "MAX_VERTICES" else 1)
-    monkeypatch.setattr(worn_limits, "MOST", 1)
+    monkeypatch.setattr(worn_limits, "MAX_ACCESSORIES", 1)
     limited = within_limits([card()])
     assert [len(one.vertices) for one in limited.accessories] == [3] and len(limited.notes) == 1
-    monkeypatch.setattr(worn_limits, "MOST", 2)
+    monkeypatch.setattr(worn_limits, "MAX_ACCESSORIES", 2)
     limited = within_limits([card()])
     np.testing.assert_array_equal(corners(limited.accessories), corners((card(),)))
     assert limited.gone == [] and all(len(one.triangles) == 1 for one in limited.accessories)

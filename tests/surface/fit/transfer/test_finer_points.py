@@ -46,6 +46,11 @@ def test_points_are_added_where_a_form_is_too_fine_for_the_net(monkeypatch) -> N
     assert rms(fitted.at, at) < 0.4 * rms(fit_points(PART, MESH, at, ALL, JAW).at, at)
 
 
+def test_no_more_points_are_added_than_the_limit_allows(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "GROWTH", 2.0)
+    assert 25 < len(fit_points(PART, MESH, bump(4.0), ALL, JAW).part.points) <= 2 * 25
+
+
 def test_a_form_that_the_net_can_follow_adds_none() -> None:
     at = REST * [1.1, 0.9, 1.0] + [0.0, 2.0, 5.0]
     fitted = fit_points(PART, MESH, at, ALL, JAW)

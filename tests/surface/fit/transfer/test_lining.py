@@ -74,5 +74,5 @@ def test_only_what_follows_the_lips_is_a_lining() -> None:
 
 
 def test_what_is_far_before_the_skin_has_nothing_to_do_with_it() -> None:
-    far = head(depth=-module.MOST_MM - 2.0)
+    far = head(depth=-module.MAX_BEFORE_MM - 2.0)
     assert keep_lining_behind(far) == (far, [])
