@@ -15,6 +15,7 @@ from surface.base.jit import inlined, nonallocating
 from surface.spline.lanes import (
     add,
     div,
+    fence,
     fma,
     item,
     load,
@@ -32,8 +33,9 @@ from surface.spline.lanes import (
 )
 
 from .binding import arrays_of
-from .groupsums import HEAD, STEP, factor_counts, join_all, join_values, sum_groups
+from .groupsums import HEAD, STEP, factor_counts, join_all, join_values, sum_groups, takes_whole
 from .packedsums import AHEAD, sum_all_packed, sum_packed, write_lanes
+from .streaming import choose_places, stream_cell
 
 AHEAD_OUT = 384  # coordinates of vertices that are fetched before they are written: 16 tiles
 MAX_SQUARE = np.float32(1e36)  # of a vector's length
@@ -134,13 +136,16 @@ def store_numerators(
     """Store the numerators of one cell, whose points are in ``local``, for later differences."""
     base, at, groups = first_tile * (72 if slopes else 24), head + HEAD, 0
     wide_u, wide_v = factor_counts(row, head, picks)
+    whole = takes_whole(row, head, picks)
     if row >= 0:
-        groups = sum_groups(factors, factor_u, factor_v, row, rows, wide_u, slopes, local, starts, scratch)
+        groups = sum_groups(factors, factor_u, factor_v, row, rows, wide_u, whole, slopes, local, starts, scratch)
     for tile in range(first_tile, end_tile):
         entries = pack_at + tile - first_tile
         if slopes:
             if row >= 0:
-                x, y, z, ax, ay, az, bx, by, bz = join_all(groups, wide_u, wide_v, at, factors, picks, starts, scratch)
+                x, y, z, ax, ay, az, bx, by, bz = join_all(
+                    groups, wide_u, wide_v, whole, at, factors, picks, starts, scratch
+                )
             elif pack_at >= 0:
                 x, y, z, ax, ay, az, bx, by, bz = sum_all_packed(
                     packed, packed_slope, entry_row, tile_entry[entries], tile_entry[entries + 1], local
@@ -154,7 +159,7 @@ def store_numerators(
             store(numerators, base + 56, by)
             store(numerators, base + 64, bz)
         elif row >= 0:
-            x, y, z = join_values(groups, wide_u, at, factors, picks, starts, scratch)
+            x, y, z = join_values(groups, wide_u, whole, at, factors, picks, starts, scratch)
         elif pack_at >= 0:
             x, y, z = sum_packed(packed, entry_row, tile_entry[entries], tile_entry[entries + 1], local)
         else:
@@ -218,7 +223,8 @@ def write_plain(first, last, tile, place, step, rows, px, py, pz, value, inv_w, 
 
 @inlined
 def write_joined(
-    first, last, tile, groups, wide_u, pick_at, px, py, pz, factors, picks, starts, order, scratch, inv_w, vertices
+    first, last, tile, groups, wide_u, whole, pick_at, px, py, pz, factors, picks, starts, order, scratch, inv_w,
+    vertices,
 ):  # fmt: skip
     """Positions of a cell with factors, whose groups have been summed."""
     full = last - (last - first) % 8
@@ -226,13 +232,13 @@ def write_joined(
         prefetch(vertices, 3 * vertex + AHEAD_OUT)  # a line is read before a part of it is written
         prefetch(vertices, 3 * vertex + AHEAD_OUT + 16)
         prefetch(inv_w, 8 * tile + AHEAD_OUT // 3)
-        x, y, z = join_values(groups, wide_u, pick_at, factors, picks, starts, scratch)
+        x, y, z = join_values(groups, wide_u, whole, pick_at, factors, picks, starts, scratch)
         x, y, z = positions_of(tile, x, y, z, inv_w)
         store3(vertices, 3 * vertex, add(x, px), add(y, py), add(z, pz))
         pick_at += STEP
         tile += 1
     if full < last:
-        x, y, z = join_values(groups, wide_u, pick_at, factors, picks, starts, scratch)
+        x, y, z = join_values(groups, wide_u, whole, pick_at, factors, picks, starts, scratch)
         x, y, z = positions_of(tile, x, y, z, inv_w)
         write_lanes(vertices, first, last, full, -1, order, add(x, px), add(y, py), add(z, pz), scratch)
 
@@ -256,48 +262,52 @@ def write_packed(
 
 
 @nonallocating
-def compute_cells(table, cells, begin, end, sign, local, scratch, starts):
+def compute_cells(table, cells, begin, end, sign, local, scratch, starts, staged):
     """Compute ``cells[begin:end]`` from their control points; their numerators are no longer stored.
 
-    ``local``, ``scratch``, ``starts`` : scratch space, of which every thread has its own.
+    ``local``, ``scratch``, ``starts``, ``staged`` : scratch space, of which every thread has its own. Cells are written
+    past the caches if there is a place ``staged`` for the vertices and normals of one.
     """
     arrays = arrays_of(table)
-    cell_start, tile_start, all_rows, room, at, ids_at, ids, value, slope = arrays[:9]
+    cell_start, tile_start, all_rows, capacity, at, ids_at, ids, value, slope = arrays[:9]
     points, origin, inv_w, dw, _, differences, vertices, normals = arrays[13:21]
     rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:39]
     packed_at, tile_entry, entry_row, packed, packed_slope, _, _, order_at, order = arrays[39:48]
+    streams, out, out_normals = choose_places(staged, vertices, normals)
     for q in range(begin, end):
         c = cells[q]
         differences[c] = -1
-        rows, first, last, pack_at = all_rows[c], cell_start[c], cell_start[c + 1], packed_at[c]
+        rows, begins, count, pack_at = all_rows[c], cell_start[c], cell_start[c + 1] - cell_start[c], packed_at[c]
+        first = 0 if streams else begins
+        last = first + count
         gather(points, ids, ids_at[c], rows, origin, c, local)
         px, py, pz = splat(np.float32(origin[c, 0])), splat(np.float32(origin[c, 1])), splat(np.float32(origin[c, 2]))
-        place, step, row, pick_at, tile = at[c], room[c] * 8, rows_at[c], picks_at[c] + HEAD, tile_start[c]
+        place, step, row, pick_at, tile = at[c], capacity[c] * 8, rows_at[c], picks_at[c] + HEAD, tile_start[c]
         wide_u, wide_v = factor_counts(row, picks_at[c], picks)
-        groups = 0
+        groups, whole = 0, takes_whole(row, picks_at[c], picks)
         if row >= 0:
             groups = sum_groups(
-                factors, factor_u, factor_v, row, rows, wide_u, dw.shape[0] > 0, local, starts, scratch
-            )  # fmt: skip
+                factors, factor_u, factor_v, row, rows, wide_u, whole, dw.shape[0] > 0, local, starts, scratch
+            )
         if dw.shape[0] == 0 and row >= 0:
             write_joined(
-                first, last, tile, groups, wide_u, pick_at, px, py, pz, factors, picks, starts, order, scratch, inv_w,
-                vertices,
+                first, last, tile, groups, wide_u, whole, pick_at, px, py, pz, factors, picks, starts, order, scratch,
+                inv_w, out,
             )  # fmt: skip
         elif dw.shape[0] == 0 and pack_at >= 0:
             write_packed(
                 first, last, tile, pack_at, px, py, pz, packed, entry_row, tile_entry, inv_w, local, order_at[c], order,
-                scratch, vertices,
+                scratch, out,
             )  # fmt: skip
         elif dw.shape[0] == 0:
             write_plain(
-                first, last, tile, place, step, rows, px, py, pz, value, inv_w, local, order, scratch, vertices
+                first, last, tile, place, step, rows, px, py, pz, value, inv_w, local, order, scratch, out
             )  # fmt: skip
         else:
             for vertex in range(first, last, 8):
                 if row >= 0:
                     x, y, z, ax, ay, az, bx, by, bz = join_all(
-                        groups, wide_u, wide_v, pick_at, factors, picks, starts, scratch
+                        groups, wide_u, wide_v, whole, pick_at, factors, picks, starts, scratch
                     )
                 elif pack_at >= 0:
                     x, y, z, ax, ay, az, bx, by, bz = sum_all_packed(
@@ -309,11 +319,14 @@ def compute_cells(table, cells, begin, end, sign, local, scratch, starts):
                 x, y, z = positions_of(tile, x, y, z, inv_w)
                 nx, ny, nz = normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw)
                 x, y, z = add(x, px), add(y, py), add(z, pz)
-                write_lanes(vertices, first, last, vertex, order_at[c], order, x, y, z, scratch)
-                write_lanes(normals, first, last, vertex, order_at[c], order, nx, ny, nz, scratch)
+                write_lanes(out, first, last, vertex, order_at[c], order, x, y, z, scratch)
+                write_lanes(out_normals, first, last, vertex, order_at[c], order, nx, ny, nz, scratch)
                 place += step
                 pick_at += STEP
                 tile += 1
+        if streams:
+            stream_cell(staged, count, begins, vertices, normals)
+    fence()
 
 
 @nonallocating

@@ -27,6 +27,7 @@ PLAIN = -1  # in ``rows_at``: the cell has plain weights
 # Operations of factors relative to plain weights, without and with normals, beyond which factors are slower (measured
 # on sheets and heads; they read less memory).
 MAX_COST = 1.0, 1.5
+MAX_WHOLE = 3.0  # numbers in rows of whole windows relative to rows in ascending order
 MAX_NUMBERS = 1 << 30  # numbers that are stored as factors; further cells keep plain weights
 MIX = 0x9E3779B1  # multiplier of the hash (Knuth, The Art of Computer Programming 6.4)
 
@@ -38,9 +39,10 @@ class Factors:
     rows_at : (c,) int64, where every cell's rows start in ``factor_u`` and ``factor_v``; PLAIN without factors
     picks_at : (c,) int64, where every cell's picks start in ``picks``
     factor_u, factor_v : (k,) int32, where the factors of a cell's rows start in ``factors``
-    factors : (f,) float32: those of a row in ascending order of their coordinates, then as many slopes if there are any
-    picks : (p,) int32: how many factors the rows of a cell have in u and in v; then, by tile, which of a window's
-        eight the lanes take in u, which in v, and where the windows start
+    factors : (f,) float32: those of a row in ascending order of their coordinates, or of lanes where tiles take whole
+        windows, then as many slopes if there are any
+    picks : (p,) int32: how many factors the rows of a cell have in u and in v, and 1 if its tiles take whole windows,
+        else 0; then, by tile, which of a window's eight the lanes take in u, which in v, and where the windows start
     slopes : are there any?
     sums : how many numbers of scratch space a kernel needs
     """
@@ -180,14 +182,36 @@ def _intern_row(row, size, table, used, slots):
 
 
 @kernel
-def _factor_row(knots, i, p, values, many, wide, weight, slopes, work, numbers, row):
-    """One point's factors, times its weight, in ``row``; zeros where there are fewer than ``wide``."""
+def _put_whole_windows(rank, size, axis, tiles, ranks, picks):
+    """Write the different windows of eight that tiles take, lane by lane, into ``ranks (8 k)``, and which of them each
+    tile takes into ``picks``; returns 8 k.
+    """
+    count = 0
+    for t in range(tiles):
+        for j in range(8):
+            ranks[8 * count + j] = rank[min(8 * t + j, size - 1)]
+        k = 0
+        while not (ranks[8 * k : 8 * k + 8] == ranks[8 * count : 8 * count + 8]).all():
+            k += 1
+        count = max(count, k + 1)
+        at = HEAD + STEP * t
+        picks[at + 16 + axis] = 8 * k
+        for j in range(8):
+            picks[at + 8 * axis + j] = j
+    picks[axis] = 8 * count
+    return 8 * count
+
+
+@kernel
+def _factor_row(knots, i, p, values, many, ranks, wide, weight, slopes, work, numbers, row):
+    """One point's factors, times its weight, in ``row``: those of the coordinates with ``ranks (<= wide)``, then zeros
+    up to ``wide``."""
     blend_along(knots, i, p, values, many, True, work, numbers)
     row[:] = 0.0
-    for k in range(many):
-        row[k] = numbers[k, 0] * weight
+    for k in range(len(ranks)):
+        row[k] = numbers[ranks[k], 0] * weight
         if slopes:
-            row[wide + k] = numbers[k, 1] * weight
+            row[wide + k] = numbers[ranks[k], 1] * weight
 
 
 @kernel
@@ -206,11 +230,26 @@ def _sort_rows(keys, ids):
 
 
 @kernel
-def _count_operations(rows, entries, groups, tiles, wide_u, slopes):
-    """Return how many operations on eight numbers a cell takes with plain weights and with factors."""
+def _count_operations(rows, groups, tiles, wide_u, whole, slopes):
+    """Return how many operations on eight numbers a cell takes with factors."""
     if slopes:
-        return 9 * entries, 6 * rows * (wide_u // 8) + 17 * groups * tiles
-    return 3 * entries, 3 * rows * (wide_u // 8) + 7 * groups * tiles
+        return 6 * rows * (wide_u // 8) + (14 if whole else 17) * groups * tiles
+    return 3 * rows * (wide_u // 8) + (4 if whole else 7) * groups * tiles
+
+
+@kernel
+def _count_groups(knots, degrees, points):
+    """Return how many different knots the ``points (k,)`` have, and so at most how many different factors."""
+    groups = 0
+    for k in range(len(points)):
+        i, new = points[k], True
+        for q in range(k):
+            j = points[q]
+            if degrees[i] == degrees[j] and (knots[i, : degrees[i] + 2] == knots[j, : degrees[j] + 2]).all():
+                new = False
+                break
+        groups += new
+    return groups
 
 
 @kernel
@@ -221,34 +260,45 @@ def _factor_cells(
     """Fill the arrays of :class:`Factors`; returns how much of the last four is used, and the room for sums."""
     widest, used, each, scratch = 8 * most, np.zeros(3, dtype=np.int64), 1 + slopes, 0
     rank_u, rank_v, order = np.zeros(widest, np.int64), np.zeros(widest, np.int64), np.zeros(widest, np.int64)
+    lanes_u, lanes_v, ascending = np.zeros(widest, np.int64), np.zeros(widest, np.int64), np.arange(widest)
     values_u, values_v, numbers = np.zeros((widest, 2)), np.zeros((widest, 2)), np.zeros((widest, 2))
-    row, own, work = np.zeros(2 * widest, np.float32), np.zeros(HEAD + STEP * most, np.int32), np.zeros(12)
+    row, work = np.zeros(2 * widest, np.float32), np.zeros(12)
+    picks_each, picks_whole = np.zeros(HEAD + STEP * most, np.int32), np.zeros(HEAD + STEP * most, np.int32)
+    picks_whole[2] = 1
     bits, table = row.view(np.int32), factors.view(np.int32)
     for c in range(rows.shape[0]):
         first, last, tiles, at = cell_start[c], cell_start[c + 1], tile_start[c + 1] - tile_start[c], used[0]
         cell_uv, sides, size = uv[first:last], side[first:last], last - first
         many_u = _sort_distinct(cell_uv, sides, 0, values_u, rank_u, order)
         many_v = _sort_distinct(cell_uv, sides, 1, values_v, rank_v, order)
+        points = ids[ids_at[c] : ids_at[c] + rows[c]].copy()
+        groups = _count_groups(knots_v, pv, points)
         wide_u, wide_v = (many_u + 7) // 8 * 8, (many_v + 7) // 8 * 8
-        if used[1] + each * (wide_u + wide_v) * rows[c] > min(MAX_NUMBERS, len(factors)):
-            continue
-        if not (
-            _put_windows(rank_u, size, wide_u, 0, tiles, own) and _put_windows(rank_v, size, wide_v, 1, tiles, own)
-        ):
+        ranks_u, ranks_v = ascending[:many_u], ascending[:many_v]
+        own, plain = picks_each, (9 if slopes else 3) * entries[c]
+        fits = _put_windows(rank_u, size, wide_u, 0, tiles, own) and _put_windows(rank_v, size, wide_v, 1, tiles, own)
+        operations = _count_operations(rows[c], groups, tiles, wide_u, False, slopes)
+        fits = fits and operations <= cost * plain
+        limit = min(cost, 1.0) * plain
+        limit = min(limit, operations) if fits else limit
+        all_u = _put_whole_windows(rank_u, size, 0, tiles, lanes_u, picks_whole)
+        all_v = _put_whole_windows(rank_v, size, 1, tiles, lanes_v, picks_whole)
+        few = all_u + all_v <= MAX_WHOLE * (wide_u + wide_v)
+        whole = few and _count_operations(rows[c], groups, tiles, all_u, True, slopes) <= limit
+        if whole:
+            fits, wide_u, wide_v, own = True, all_u, all_v, picks_whole
+            ranks_u, ranks_v = lanes_u[:all_u], lanes_v[:all_v]
+        if not fits or used[1] + each * (wide_u + wide_v) * rows[c] > min(MAX_NUMBERS, len(factors)):
             continue
         for k in range(rows[c]):
-            i = ids[ids_at[c] + k]
-            _factor_row(knots_v, i, pv[i], values_v, many_v, wide_v, 1.0, slopes, work, numbers, row)
+            i = points[k]
+            _factor_row(knots_v, i, pv[i], values_v, many_v, ranks_v, wide_v, 1.0, slopes, work, numbers, row)
             factor_v[at + k] = _intern_row(bits, each * wide_v, table, used[1], slots)
             used[1] = max(used[1], factor_v[at + k] + each * wide_v)
-        points = ids[ids_at[c] : ids_at[c] + rows[c]].copy()
         groups = _sort_rows(factor_v[at : at + rows[c]], points)
-        plain, factored = _count_operations(rows[c], entries[c], groups, tiles, wide_u, slopes)
-        if factored > cost * plain:
-            continue
         for k in range(rows[c]):
             i = ids[ids_at[c] + k] = points[k]
-            _factor_row(knots_u, i, pu[i], values_u, many_u, wide_u, weights[i], slopes, work, numbers, row)
+            _factor_row(knots_u, i, pu[i], values_u, many_u, ranks_u, wide_u, weights[i], slopes, work, numbers, row)
             factor_u[at + k] = _intern_row(bits, each * wide_u, table, used[1], slots)
             used[1] = max(used[1], factor_u[at + k] + each * wide_u)
         picks_at[c] = _intern_row(own, HEAD + STEP * tiles, picks, used[2], pick_slots)

@@ -10,7 +10,7 @@ from surface import DCPSurface
 from surface.bench.bench import sheet
 from surface.deform import factors
 from surface.deform.deformation import Deformation
-from surface.deform.factors import HEAD, STEP, _put_windows
+from surface.deform.factors import HEAD, STEP, _count_groups, _put_whole_windows, _put_windows
 from surface.deform.lists import LANES, Basis, Lists, build_lists
 from surface.deform.storage import Storage, compress, expand
 from surface.mesh.domain import Domain, Slit
@@ -63,6 +63,38 @@ def test_windows_hold_the_places_of_their_own_eight_lanes() -> None:
     assert not _put_windows(np.array([0, 8, 3]), 3, 12, 0, 1, picks)  # nine places are too many
     assert _put_windows(np.array([9, 11]), 2, 12, 0, 1, picks) and picks[HEAD + 16] == 4  # no window ends beyond
     assert picks[HEAD : HEAD + 8].tolist() == [5, 7, 0, 0, 0, 0, 0, 0]
+
+
+def test_tiles_with_the_same_eight_places_share_a_whole_window() -> None:
+    picks, ranks = np.full(HEAD + 3 * STEP, -1, np.int64), np.full(24, -1)
+    rank = np.array([0, 1, 0, 1, 2, 3, 2, 3, 8, 9, 8, 9, 0, 0, 0, 0, 0, 1, 0, 1, 2, 3])  # the last tile: six vertices
+    assert _put_whole_windows(rank, 22, 1, 3, ranks, picks) == 24 == picks[1]
+    assert ranks.tolist() == [*rank, 3, 3]  # lanes without a vertex repeat the last one
+    assert picks[HEAD + STEP * np.arange(3) + 17].tolist() == [0, 8, 16]
+    again = np.concatenate([rank[:16], rank[:8]])
+    assert _put_whole_windows(again, 24, 0, 3, ranks, picks) == 16 == picks[0]
+    assert picks[HEAD + STEP * np.arange(3) + 16].tolist() == [0, 8, 0]
+    assert (picks[HEAD:].reshape(3, STEP)[:, :16] == np.tile(np.arange(8), 2)).all()
+
+
+def test_points_with_equal_knots_are_one_group() -> None:
+    knots, degrees = (
+        np.array([[0.0, 1, 2, 3, 9], [0, 1, 2, 3, 7], [0, 1, 2, 3, 9], [0, 1, 2, 3, 9]]),
+        np.array([3, 2, 3, 2]),
+    )
+    assert _count_groups(knots, degrees, np.array([0, 2])) == 1
+    assert _count_groups(knots, degrees, np.array([1, 3])) == 1  # what follows a point's own knots does not count
+    assert _count_groups(knots, degrees, np.arange(4)) == 2
+
+
+def test_tiles_take_whole_windows_where_that_needs_fewer_operations() -> None:
+    surface, mesh = sheet(2_000)
+    taken = {}
+    for normals in (False, True):
+        made = surface.deformation(mesh, normals=normals).storage.factors
+        taken[normals] = made.picks[made.picks_at[made.rows_at >= 0] + 2]
+    assert taken[False].mean() > 0.7  # all cells of eight and more tiles, which pick in few different ways
+    assert 0 < taken[True].mean() < taken[False].mean()  # with slopes, more lanes in sums over points cost more
 
 
 def test_factors_take_less_memory_and_neighbours_share_them() -> None:

@@ -41,17 +41,22 @@ class Cell(NamedTuple):
         return np.concatenate([np.einsum("trj,rc->tcj", one, places) for one in (a * b, u * b, a * v)], axis=1)
 
 
-def made_cell(groups: tuple[int, ...], wide_u: int = 16, wide_v: int = 24) -> Cell:
-    """A cell with so many points in each group; points of a group share their factors in v."""
+def made_cell(groups: tuple[int, ...], wide_u: int = 16, wide_v: int = 24, whole: bool = False) -> Cell:
+    """A cell with so many points in each group; points of a group share their factors in v.
+
+    whole : its tiles take whole windows of eight.
+    """
     rng, rows = np.random.default_rng(sum(groups)), sum(groups)
     factors = rng.normal(size=2 * wide_u * rows + 2 * wide_v * len(groups)).astype(np.float32)
     factor_u = 2 * wide_u * rng.permutation(rows)
     factor_v = 2 * wide_u * rows + 2 * wide_v * np.repeat(np.arange(len(groups)), groups)
     picks = np.zeros(HEAD + STEP * TILES, np.int32)
-    picks[:HEAD] = wide_u, wide_v
+    picks[:HEAD] = wide_u, wide_v, whole
     for tile in picks[HEAD:].reshape(TILES, STEP):
-        tile[:16] = rng.integers(0, 8, 16)
-        tile[16:] = rng.integers(0, [wide_u - 7, wide_v - 7])
+        tile[:16] = np.tile(np.arange(8), 2) if whole else rng.integers(0, 8, 16)
+        tile[16:] = (
+            8 * rng.integers(0, [wide_u // 8, wide_v // 8]) if whole else rng.integers(0, [wide_u - 7, wide_v - 7])
+        )
     other = np.full(SHIFT, -1)
     rows_u, rows_v = (np.concatenate([other, k]).astype(np.int32) for k in (factor_u, factor_v))
     return Cell(factors, rows_u, rows_v, picks, rng.normal(size=(rows + 1, 3)).astype(np.float32), rows, wide_u, wide_v)
@@ -60,11 +65,14 @@ def made_cell(groups: tuple[int, ...], wide_u: int = 16, wide_v: int = 24) -> Ce
 @njit
 def run_groups(factors, factor_u, factor_v, picks, local, rows, wide_u, wide_v, slopes, starts, scratch, out):
     """Both halves of the sum; ``out (tiles, 72)``. Returns how many groups there are."""
-    groups = groupsums.sum_groups(factors, factor_u, factor_v, SHIFT, rows, wide_u, slopes, local, starts, scratch)
+    whole = groupsums.takes_whole(0, 0, picks)
+    groups = groupsums.sum_groups(
+        factors, factor_u, factor_v, SHIFT, rows, wide_u, whole, slopes, local, starts, scratch
+    )
     for tile in range(TILES):
         at = HEAD + STEP * tile
         if slopes:
-            sums = groupsums.join_all(groups, wide_u, wide_v, at, factors, picks, starts, scratch)
+            sums = groupsums.join_all(groups, wide_u, wide_v, whole, at, factors, picks, starts, scratch)
             groupsums.store(out, 72 * tile + 24, sums[3])
             groupsums.store(out, 72 * tile + 32, sums[4])
             groupsums.store(out, 72 * tile + 40, sums[5])
@@ -75,7 +83,7 @@ def run_groups(factors, factor_u, factor_v, picks, local, rows, wide_u, wide_v, 
             groupsums.store(out, 72 * tile + 8, sums[1])
             groupsums.store(out, 72 * tile + 16, sums[2])
         else:
-            x, y, z = groupsums.join_values(groups, wide_u, at, factors, picks, starts, scratch)
+            x, y, z = groupsums.join_values(groups, wide_u, whole, at, factors, picks, starts, scratch)
             groupsums.store(out, 72 * tile, x)
             groupsums.store(out, 72 * tile + 8, y)
             groupsums.store(out, 72 * tile + 16, z)
@@ -84,8 +92,9 @@ def run_groups(factors, factor_u, factor_v, picks, local, rows, wide_u, wide_v, 
 
 @pytest.mark.parametrize("slopes", [False, True])
 @pytest.mark.parametrize("groups", [(1,), (4, 1, 2), (1, 1, 1, 1, 1), (9,)])
-def test_two_halves_of_a_sum_make_the_whole(groups: tuple[int, ...], slopes: bool) -> None:
-    cell = made_cell(groups)
+@pytest.mark.parametrize(("whole", "wide_u"), [(False, 16), (False, 24), (True, 8), (True, 32), (True, 40)])
+def test_two_halves_of_a_sum_make_the_whole(groups: tuple[int, ...], slopes: bool, whole: bool, wide_u: int) -> None:
+    cell = made_cell(groups, wide_u, whole=whole)
     starts, scratch = np.full(len(groups), -1, np.int32), np.zeros(24 + 6 * cell.wide_u * len(groups), np.float32)
     out = np.full(72 * TILES, np.nan, np.float32)
     assert run_groups(*cell, slopes, starts, scratch, out) == len(groups)
@@ -123,7 +132,7 @@ def run_products(factors, picks, at_u, at_v, wide_u, wide_v, tile, out):
 
 def test_weights_of_a_point_are_products_of_what_its_lanes_pick() -> None:
     cell, out = made_cell((1,)), np.zeros(32, np.float32)
-    low_u, low_v = cell.picks[HEAD + STEP + 16 :]
+    low_u, low_v = cell.picks[HEAD + STEP + 16 : HEAD + 2 * STEP]
     at_u, at_v = int(cell.factor_u[SHIFT] + low_u), int(cell.factor_v[SHIFT] + low_v)
     run_products(cell.factors, cell.picks, at_u, at_v, cell.wide_u, cell.wide_v, HEAD + STEP, out)
     a, b = cell.along(cell.factor_u, 0, 0)[1, 0], cell.along(cell.factor_v, 1, 0)[1, 0]
@@ -140,3 +149,14 @@ def test_a_cell_says_how_many_factors_its_rows_have_and_one_with_plain_weights_n
     picks = np.array([9, 9, 16, 24], np.int32)
     assert run_wide(0, 2, picks) == (16, 24)
     assert run_wide(-1, 2, picks) == (0, 0)
+
+
+@njit
+def run_whole(row, head, picks):
+    return groupsums.takes_whole(row, head, picks)
+
+
+def test_a_cell_says_whether_its_tiles_take_whole_windows() -> None:
+    picks = np.array([9, 16, 24, 1, 16, 24, 0], np.int32)
+    assert run_whole(5, 1, picks) and not run_whole(5, 4, picks)
+    assert not run_whole(-1, 1, picks)  # plain weights
