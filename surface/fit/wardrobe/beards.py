@@ -15,17 +15,18 @@ from surface.fit.wardrobe.styles import BARE, step
 #: By the angle from the front, degrees, about the vertical through (0, 20): the beard's upper and lower line, mm, and
 #: the upper line of its part below the mouth.
 _ANGLES = np.array([0.0, 8.0, 15.0, 20.0, 24.0, 32.0, 45.0, 60.0, 75.0, 87.0, 95.0])
-_UPPER = np.array([-15.5, -14.5, -16.0, -20.0, -26.5, -35.0, -35.0, -26.0, -8.0, 12.0, 14.0])
+_UPPER = np.array([-13.0, -12.0, -13.0, -16.5, -22.0, -27.5, -31.0, -25.0, -8.0, 12.0, 14.0])
 _LOWER = np.array([-94.0, -94.0, -93.0, -92.0, -90.0, -88.0, -84.0, -76.0, -60.0, -32.0, -4.0])
-_BELOW = np.array([-45.0, -45.0, -43.5, -39.5, -35.0, -35.0, -35.0, -26.0, -8.0, 12.0, 14.0])
-_LIP = np.array([-22.5, -23.0, -25.0, -28.5, -33.0])  # lower line of the moustache, at the first five angles: it ends
+_BELOW = np.array([-44.0, -44.0, -42.0, -36.0, -28.0, -27.5, -31.0, -25.0, -8.0, 12.0, 14.0])
+_LIP = np.array([-23.5, -24.0, -26.0, -29.5, -34.0])  # lower line of the moustache, at the first five angles: it ends
 # level with the corners of the mouth, since one that hangs over them makes every face look sad
 _EDGE_DEG = 90.0
-_LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.8])
+_LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.2])
 _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips is theirs
 _LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
 _FIELD_MM = -7.0, 11.0  # inside the beard's lines: where stubble begins, and where it is dense
 _DENSER = 1.3  # hair over the lip, which is too short to lie over what is beside it
+_LIP_MM = 1.6  # inside its lines, where that is dense
 _SIDE_DEG, _SIDE = (60.0, 88.0), 0.85  # between which it gets shorter towards the ear, and by which share
 _HAIRS = 1.0 / 26.0  # tiles of the noise for a mm across hairs
 _ROOTS_MM, _SHORTER = 7.0, 10.0  # from a shell's upper line, where hairs are seen in so many times shorter pieces
@@ -73,7 +74,7 @@ def garment(skin: Skin, beard: Beard) -> list[Patches]:
     out = []
     for k, (share, cover) in enumerate(beard.shells):
         out.append(_shell(skin, beard, main, (43, 13), (23, 7), share, cover, k, 9.0, over_lip=False))
-        out.append(_shell(skin, beard, lip, (19, 6), (10, 4), share, _DENSER * cover, k, 2.2, over_lip=True))
+        out.append(_shell(skin, beard, lip, (19, 6), (10, 4), share, _DENSER * cover, k, _LIP_MM, over_lip=True))
     return out
 
 
@@ -130,7 +131,7 @@ def _shell(
     openness = 0.72 + 0.28 * share + 0.0 * s
     if over_lip:
         openness = 0.75 * openness
-        reached = reached * step(np.minimum(s, 1.0 - s), 0.0, 0.18) * (1.0 - 0.8 * step(t, 0.5, 1.0))
+        reached = reached * step(np.minimum(s, 1.0 - s), 0.0, 0.14) * (1.0 - 0.8 * step(t, 0.65, 1.0))
     along = (t * length - _ROOTS_MM * _SHORTER * np.exp(-t * length / _ROOTS_MM)) / beard.grain
     strands = np.stack(
         [s * width * _HAIRS + 0.31 * layer, along, cover * reached - BARE * (1.0 - reached), openness], axis=-1
@@ -149,7 +150,7 @@ def _reached(places: Floats, full_mm: float, share: float) -> Floats:
     out = step(deep, -0.3 * full_mm, 1.2 * full_mm)
     x, y, z = places.T
     lip = step(y, -36.0, -30.0) * step(z, 70.0, 80.0)
-    thinner = 0.45 * step(np.abs(x), 15.0, 29.0) + 0.3 * np.exp(-((x / 2.5) ** 2))
+    thinner = 0.3 * step(np.abs(x), 18.0, 31.0) + 0.2 * np.exp(-((x / 2.0) ** 2))
     return np.asarray(out * (1.0 - lip * thinner))
 
 
