@@ -314,7 +314,7 @@ MATERIALS: dict[str, Material] = {
     "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, order=3),
     "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.42, grooved=True, order=4),
     "gums": _inner((0.48, 0.15, 0.14), 0.3, 0.20, order=5),
-    "mouth": _inner((0.32, 0.09, 0.08), 0.3, 0.08, two_sided=True, order=6),
+    "mouth": _inner((0.46, 0.16, 0.15), 0.3, 0.20, two_sided=True, order=6),
 }
 
 
