@@ -14,13 +14,14 @@ from surface.check.subject import Subject, pose_of
 from surface.fit.features.finish import PRODUCT
 from surface.fit.measures.closest import ClosestTree
 from surface.fit.measures.inside_out import InsideOutFaces
+from surface.fit.measures.mesh_pose import displacement
 from surface.fit.points.report import NEUTRAL, Both, DenseErrors, Errors, FittedPart, Spot, Turned, errors_of
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.head import Head
 from surface.head.model.data import HeadData, PartData
 from surface.head.model.meshes import domain_of
-from surface.head.model.parameters import SHAPES, TONGUE_JAW
+from surface.head.model.parameters import SHAPES
 
 NO_TRIANGLES = np.zeros((0, 3), np.int64)
 
@@ -145,7 +146,7 @@ def measure_dense(
     sticking: dict[tuple[str, str], Floats] = {}
     turned: dict[tuple[str, str], Turned] = {}
     for shape in (NEUTRAL, *(n for n in sources if n in subject.claimed)):
-        moved = mesh.vertices + _displacement(mesh, sources, shape)
+        moved = mesh.vertices + displacement(mesh, sources, shape, head.jaw)
         for pair in pairs:
             surface = _posed(subject, shape, pair.number)
             both = pair.distances(surface, moved)
@@ -249,17 +250,6 @@ def _cut_off(mesh: FitMesh, part: FittedPart, data: PartData) -> Bools:
     alone = np.flatnonzero(np.diff(chart.mix.indptr) == 1)
     gone = alone[~domain_of(data).inside(chart.uv[alone])]
     out[chart.mix.indices[chart.mix.indptr[gone]]] = True
-    return out
-
-
-def _displacement(mesh: FitMesh, sources: dict[str, list[int]], shape: str) -> Floats:
-    """(n, 3) of the mesh's vertices in the pose that shows a shape."""
-    amounts = {n: v for n, v in pose_of(shape).items() if n in sources} if shape != NEUTRAL else {}
-    if shape == "tongueOut" and "jawOpen" in sources:  # opens the jaw as far as it needs
-        amounts["jawOpen"] = TONGUE_JAW
-    out = np.zeros_like(mesh.vertices)
-    for name, amount in amounts.items():
-        out += amount * mesh.deltas[sources[name]].sum(axis=0)
     return out
 
 
