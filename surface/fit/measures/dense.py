@@ -186,9 +186,10 @@ def measure_dense(
     rest = ~np.any([*owned, np.zeros(len(mesh.faces), bool)], axis=0)
     added = tuple(p.name for p in subject.parts if p.name not in found)
     samples = sum(len(r) for p in pairs for r in p.rest)
+    parted, sealed = free.most if free is not None else (None, None)
     return DenseErrors(
         found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking, turned,
-        tuple(n for n in changed if n in sources), apart, *(free.most if free is not None else (None, None)),
+        tuple(n for n in changed if n in sources), apart, parted, sealed,
         otherwise, stiff,
     )  # fmt: skip
 

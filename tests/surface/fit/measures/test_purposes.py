@@ -1,6 +1,7 @@
 """What a head does otherwise than its mesh on purpose."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -36,10 +37,10 @@ def test_a_corrective_that_another_shape_of_the_pose_takes_back_changes_nothing(
 @pytest.mark.parametrize(("follows", "amount"), [("jaw", 1.0), ("skull", 0.0)])
 def test_what_follows_as_a_whole_goes_with_the_jaw_or_stays(follows: str, amount: float) -> None:
     values = lambda pose: np.array([pose.get(n, 0.0) for n in NAMES])  # noqa: E731
-    subject = SimpleNamespace(head=SimpleNamespace(data=head(), values=values))
+    subject: Any = SimpleNamespace(head=SimpleNamespace(data=head(), values=values))
     at = np.array([[0.0, -30.0, 100.0], [5.0, -35.0, 90.0]])
     turn, shift = jaw_path(JAW, amount)
-    np.testing.assert_allclose(moved_as_a_whole(subject, follows, at, "jawOpen"), at @ turn.T + shift)
+    np.testing.assert_allclose(np.asarray(moved_as_a_whole(subject, follows, at, "jawOpen")), at @ turn.T + shift)
     np.testing.assert_allclose(moved_as_a_whole(subject, follows, at, "neutral"), at)
 
 
