@@ -199,7 +199,7 @@ def close_nearly(gaps: Floats, firm: Floats) -> None:
     firm : (k,) 0..1, by which share in each column.
     """
     if gaps.max() < NEARLY_MM:
-        gaps += firm * (np.minimum(gaps, -HIDDEN_MM) - gaps)
+        gaps[:] = (1.0 - firm) * gaps + firm * np.minimum(gaps, -HIDDEN_MM)  # exactly the latter where firm is 1
 
 
 def corner_fade(columns: int) -> Floats:
