@@ -17,6 +17,7 @@ from surface.fit.eyes.drawn_lids import seat_drawn_lids
 from surface.fit.eyes.lids import fit_lids, gazes_of
 from surface.fit.features.accessories import make_accessories
 from surface.fit.features.blink_squints import cancel_squints_in_blinks
+from surface.fit.features.cavity import MATERIAL
 from surface.fit.features.combs import combed
 from surface.fit.features.cutouts import cut_out
 from surface.fit.features.findings import findings
@@ -69,6 +70,8 @@ LOOSE_MM = 3.0  # RMS
 LOOSE_99_MM = 5.0  # 99 of 100 samples
 # pose that decides how finely a part is cut into triangles
 SAMPLE_POSE = {"jawOpen": 0.6, "mouthSmileLeft": 0.4, "mouthSmileRight": 0.4, "eyeBlinkLeft": 0.4, "eyeBlinkRight": 0.4}
+
+LINING_POSE = {**SAMPLE_POSE, "jawOpen": 1.0, "mouthClose": 0.5}  # of what lines the mouth, which bends most over a jaw
 
 
 def fit_head(
@@ -287,7 +290,8 @@ def _with_mesh(part: PartData, head: HeadData) -> PartData:
     """The part with its tessellation, so that a face starts at once; fine enough for a face that moves."""
     surface = make_surface(part)
     if part.follows == "skin":
-        moved = SkinRig(part, head).apply(read_pose(np.array([SAMPLE_POSE.get(n, 0.0) for n in NAMES])))
+        pose = LINING_POSE if part.material == MATERIAL else SAMPLE_POSE
+        moved = SkinRig(part, head).apply(read_pose(np.array([pose.get(n, 0.0) for n in NAMES])))
         surface = surface.with_points(with_deep_wrinkles(part, moved))
     return replace(part, mesh=pack(tessellate(part, surface, head.seams), part.budget))
 

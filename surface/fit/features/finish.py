@@ -12,7 +12,16 @@ import numpy as np
 from surface.base import files
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
-from surface.fit.features.rigging import DROOP, DROOP_RULE, LOW_RULE, drawn_back_tongue, lowered_tongue
+from surface.fit.features.rigging import (
+    BACK,
+    BACK_RULE,
+    DROOP,
+    DROOP_RULE,
+    LOW,
+    LOW_RULE,
+    drawn_back_tongue,
+    lowered_tongue,
+)
 from surface.fit.features.wrinkles import add_wrinkles
 from surface.fit.points.recipe import Recipe
 from surface.fit.points.strokes import arc_length
@@ -105,9 +114,10 @@ def lower_tongue(head: HeadData, recipe: Recipe) -> HeadData:
 
 def draw_back_tongue(head: HeadData, recipe: Recipe) -> HeadData:
     """The head whose tongue draws back from a lower lip that rolls in, where the recipe says how far."""
-    if not recipe.tongue_back:
+    if not recipe.tongue_back or not any(part.material == "tongue" for part in head.parts):
         return head
-    return _with_tongue_group(head, lambda at: drawn_back_tongue(at, np.array(recipe.tongue), recipe.tongue_back))
+    head = _with_tongue_group(head, lambda at: drawn_back_tongue(at, np.array(recipe.tongue), recipe.tongue_back))
+    return replace(head, rules=[*head.rules, BACK_RULE])
 
 
 def _with_tongue_group(head: HeadData, made: Callable[[Floats], Group]) -> HeadData:
@@ -142,6 +152,11 @@ def _corrected(part: PartData, name: str, shares: dict[str, float]) -> PartData:
         field[g.ids] -= np.float32(shares.get(g.name, 0.0)) * g.moves
     ids = np.flatnonzero(np.abs(field).max(axis=1) > 1e-3).astype(np.int32)
     return replace(part, groups=[*part.groups, Group(name, ids, field[ids])]) if len(ids) else part
+
+
+def is_on_purpose(rule: Rule) -> bool:
+    """Whether a rule changes shapes of the mesh on purpose: a corrective, or what the tongue gives way to."""
+    return PRODUCT in rule.group or rule.group in (LOW, BACK)
 
 
 def find_contacts(

@@ -138,7 +138,8 @@ def _skin(
         out.append(_part("back", "skin", points, 0.1, 0.4, scale, rest, mesh))
     if inner:
         points, coarse, error = cavity.POINTS, cavity.COARSE, cavity.ERROR_MM
-        out.append(_part(cavity.NAME, cavity.MATERIAL, points, coarse, error, scale, inner, mesh))
+        made, own = _part(cavity.NAME, cavity.MATERIAL, points + cavity.SPARE, coarse, error, scale, inner, mesh)
+        out.append((replace(made, request=replace(made.request, spare=cavity.SPARE)), own))
     return out
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from scipy.sparse import csr_matrix
 
 from surface.base.arrays import Floats, Ints
 from surface.dcp import DCPSurface
@@ -20,6 +21,7 @@ from surface.fit.points.strokes import mirrored, smooth_line, uv_of
 from surface.fit.source.chart import TILE, Chart
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import Jaw, PartData
+from surface.head.posing.contact import LID_MM
 
 DEGREES = (3, 2)
 END_LASH = 0.045  # distance of the first and the last lash from the strip's ends
@@ -31,6 +33,7 @@ LASH_MM, LOWER_LASH_MM = 8.0, 3.2
 STRIP_BUDGET = {"brow": (0, 0.4, 6), "lash": (0, 0.2, 7)}  # fine enough for single hairs
 LASHES, LOWER_LASHES = 24, 14
 BESIDE = 0.15  # in radii of an eyeball: so near to their own surface half the control points that keep to it have to be
+BENT = 0.04  # in radii: more than this a strip that keeps to an eyeball may not lie beside a shape that was fitted
 BROW_MM = (4.2, 4.6)  # how far a brow reaches below and above its line
 
 
@@ -172,8 +175,25 @@ def _lid_share(part: PartRecipe, fitted: Fitted, rig: HeadRig) -> Floats:
     held = np.flatnonzero(share)
     if part.material == "skin" or not len(held):
         return share
-    away = np.linalg.norm(basis(fitted.net, fitted.net.centres) @ fitted.points - fitted.points, axis=1)
-    return share if np.median(away[held]) < BESIDE * rig.radius else np.zeros(len(share))
+    at = basis(fitted.net, fitted.net.centres)
+    away = np.linalg.norm(at @ fitted.points - fitted.points, axis=1)
+    keeps = np.median(away[held]) < BESIDE * rig.radius and _bent(fitted, at, share, rig) < BENT * rig.radius
+    return share if keeps else np.zeros(len(share))
+
+
+def _bent(fitted: Fitted, at: csr_matrix, share: Floats, rig: HeadRig) -> float:
+    """How far, mm, a strip lies beside its own shapes where control points that a shape takes into the eyeball are kept
+    out of it, as :class:`.rig.Lids` does. at : rows of the strip's places."""
+    held = np.flatnonzero(share)
+    local = fitted.points[held] - rig.eyes[(share[held] < 0).astype(int)]
+    least = np.minimum(np.linalg.norm(local, axis=1), rig.radius + LID_MM)
+    most = 0.0
+    for indices in rig.sources.values():
+        moved = local + fitted.moves[indices].sum(axis=0)[held]
+        length = np.maximum(np.linalg.norm(moved, axis=1), 1e-6)
+        kept = (np.abs(share[held]) * (np.maximum(length, least) / length - 1.0))[:, None] * moved
+        most = max(most, float(np.linalg.norm(at[:, held] @ kept, axis=1).max(initial=0.0)))
+    return most
 
 
 def teeth_part(mesh: FitMesh, part: PartRecipe, rig: HeadRig) -> tuple[PartData, PartReport]:

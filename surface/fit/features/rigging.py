@@ -21,7 +21,8 @@ DROOP_RULE = Rule(DROOP, ({"tongueOut": 1.0},), 4.0)
 LOW = "tongueLow"
 LOW_RULE = Rule(LOW, ({"jawOpen": 1.0, "jawLeft": 0.4, "jawRight": 0.4},))  # upper teeth do not go aside with the jaw
 LOW_NARROWER, LOW_BACK = 0.2, 0.7  # of the width, and back by this share of how much it sinks
-ROLLED = "mouthRollLower"  # the lower lip that goes in over the teeth, before which the tongue's tip draws back
+BACK = "tongueBack"
+BACK_RULE = Rule(BACK, ({"mouthRollLower": 1.0},))  # the lower lip goes in over the teeth: the tongue's tip gives way
 TILTS = ("jawForward", "jawLeft", "jawRight")
 
 
@@ -108,7 +109,7 @@ def lowered_tongue(points: Floats, path: Floats, by_mm: float) -> Group:
 
 
 def drawn_back_tongue(points: Floats, path: Floats, by_mm: float) -> Group:
-    """:data:`ROLLED`: the front of the tongue goes back by ``by_mm``, its tip the furthest, and leaves its place to the
+    """:data:`BACK`: the front of the tongue goes back by ``by_mm``, its tip the furthest, and leaves its place to the
     lip.
 
     points, path : as for :func:`tongue_groups`.
@@ -116,7 +117,7 @@ def drawn_back_tongue(points: Floats, path: Floats, by_mm: float) -> Group:
     moves = np.zeros((len(points), 3), np.float32)
     moves[:, 2] = np.round(-by_mm * smoothstep(points[:, 2], path[1, 0], path[-2, 0]), 4)
     ids = np.flatnonzero(moves[:, 2]).astype(np.int32)
-    return Group(ROLLED, ids, moves[ids])
+    return Group(BACK, ids, moves[ids])
 
 
 def _along_path(points: Floats, first: float, last: float, path: Callable[..., Floats]) -> Floats:

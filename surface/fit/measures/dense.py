@@ -6,21 +6,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats
 from surface.check.mouth import find_mouth
 from surface.check.places import Places
-from surface.check.subject import Subject, pose_of
-from surface.fit.features.finish import PRODUCT
+from surface.check.subject import Subject
 from surface.fit.measures.closest import ClosestTree
 from surface.fit.measures.inside_out import InsideOutFaces
+from surface.fit.measures.mesh_pose import displacement
+from surface.fit.measures.purposes import RIGID, moved_as_a_whole, without_changes
 from surface.fit.points.report import NEUTRAL, Both, DenseErrors, Errors, FittedPart, Spot, Turned, errors_of
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.head import Head
 from surface.head.model.data import HeadData, PartData
 from surface.head.model.meshes import domain_of
-from surface.head.model.parameters import SHAPES, TONGUE_JAW
 
 NO_TRIANGLES = np.zeros((0, 3), np.int64)
 
@@ -34,6 +35,7 @@ class _Pair:
 
     def __init__(self, part: FittedPart, data: PartData, number: int, subject: Subject, mesh: FitMesh) -> None:
         self.name, self.number, self.material = part.name, number, subject.parts[number].material
+        self.follows = data.follows
         self._uv = np.asarray(subject.parts[number].uv, np.float64)
         faces = mesh.faces[faces_of(mesh, part.chart)]
         self.turned = InsideOutFaces(part, subject.parts[number])
@@ -46,6 +48,7 @@ class _Pair:
         self.rest = self._samples(0, at[0]), self._samples(1, at[1])
         folded = _folded(mesh, part)
         flat, whole = (np.asarray(folded[cut].any(axis=1), bool) for cut in (self._cut[1], every))
+        self._bridges = _bridges(part, self._samples(0, np.pad(self._uv, ((0, 0), (0, 1))))[:, :2])
         self._fold_of, self._fold_at = whole[self._trees[1].order], np.concatenate([folded[self._used[1]], flat])
 
     def _samples(self, k: int, vertices: Floats) -> Floats:
@@ -59,7 +62,7 @@ class _Pair:
             tree.move(vertices)
         to_mesh = self._trees[1].distances(self._samples(0, surface), self._near[0])
         to_surface = self._trees[0].distances(self._samples(1, mesh), self._near[1])
-        return [(to_mesh, self._fold_of[self._near[0]]), (to_surface, self._fold_at)]
+        return [(to_mesh, self._fold_of[self._near[0]] | self._bridges), (to_surface, self._fold_at)]
 
     def greater_elsewhere(
         self, surface: Floats, mesh: Floats, before: Floats, found: list[tuple[Floats, Bools]], least: float
@@ -80,7 +83,7 @@ class _Pair:
         if len(rows[0]):
             there = self._near[0][rows[0]]
             out[0][rows[0]] = self._trees[1].distances(self._samples(0, surface)[rows[0]], there)
-            fold[rows[0]] = self._fold_of[there]
+            fold[rows[0]] = self._fold_of[there] | self._bridges[rows[0]]
         if len(rows[1]):
             tree.move(surface)
             out[1][rows[1]] = tree.distances(self._samples(1, mesh)[rows[1]], near[rows[1]])
@@ -91,6 +94,13 @@ class _Pair:
         moved = np.linalg.norm(after - before, axis=1)[self._used[0]]
         row = int(moved.argmax())
         return Spot(float(moved[row]), shape, self.name, places.name(self.rest[0][row], self.material), True)
+
+    def furthest_of_mesh(self, before: Floats, after: Floats, shape: str, places: Places) -> Spot:
+        """The vertex of the mesh that is furthest from itself in two poses (n, 3)."""
+        moved = np.linalg.norm(after - before, axis=1)[self._used[1]]
+        row = int(moved.argmax()) if len(moved) else 0
+        far = float(moved[row]) if len(moved) else 0.0
+        return Spot(far, shape, self.name, places.name(self.rest[1][row], self.material), False)
 
     def sticking(self, to_mesh: Floats, fold: Bools, limit: float) -> Floats:
         """(k, 2) in (u, v): the surface's vertices that are further from the mesh than ``limit``, outside folds."""
@@ -124,14 +134,16 @@ def measure_dense(
 ) -> DenseErrors:  # fmt: skip
     """Distances between a head and the mesh that it was fitted to, in neutral and with each of its shapes at 1.
 
-    The head is posed as it always is, with its jaw, eyes, contacts and wrinkles, but without correctives, which change
-    a shape of the mesh on purpose: what they change is said. Samples are all vertices and centres
-    of triangles on both sides; each part is compared with the faces that it was fitted to, folds apart.
+    The head is posed as it always is, with its jaw, eyes, contacts and wrinkles, but without what changes a shape of
+    the mesh on purpose (:mod:`.purposes`): what that is, and how far it goes, is said. Samples are all vertices and
+    centres of triangles on both sides; each part is compared with the faces that it was fitted to, folds apart.
     sources : by parameter, the shapes of the mesh that add up to it. limit : mm, from which a vertex sticks out.
-    fit_alone : find the greatest error of what was fitted alone, without contacts, too, where the head has contacts.
+    fit_alone : find the greatest error of what was fitted alone, without contacts, too, where the head has contacts;
+        and how far the head is moved on purpose.
     """
-    head, changed = without_correctives(head)
+    whole, (head, changed) = head, without_changes(head)
     subject = Subject(Head(head))
+    shown = Subject(Head(whole)) if fit_alone and changed else None
     free = _ContactMoves(head) if fit_alone and head.contacts else None
     places = Places(subject, find_mouth(subject))
     numbers = {p.name: k for k, p in enumerate(subject.parts)}
@@ -142,12 +154,20 @@ def measure_dense(
     found: dict[str, dict[str, Both]] = {p.name: {} for p in pairs}
     worst: dict[bool, Spot] = {}
     apart: Spot | None = None
+    otherwise: Spot | None = None
+    stiff: Spot | None = None
     sticking: dict[tuple[str, str], Floats] = {}
     turned: dict[tuple[str, str], Turned] = {}
     for shape in (NEUTRAL, *(n for n in sources if n in subject.claimed)):
-        moved = mesh.vertices + _displacement(mesh, sources, shape)
+        own = mesh.vertices + displacement(mesh, sources, shape, head.jaw)
         for pair in pairs:
-            surface = _posed(subject, shape, pair.number)
+            surface, moved = _posed(subject, shape, pair.number), own
+            if pair.follows in RIGID:
+                moved = moved_as_a_whole(subject, pair.follows, mesh.vertices, shape)
+                stiff = _greater(stiff, pair.furthest_of_mesh(own, moved, shape, places))
+            if shown is not None and shape in changed:
+                both_ways = surface, _posed(shown, shape, pair.number)
+                otherwise = _greater(otherwise, pair.furthest(*both_ways, shape, places))
             both = pair.distances(surface, moved)
             if len(places_out := pair.sticking(*both[0], limit)):
                 sticking[pair.name, shape] = places_out
@@ -166,9 +186,11 @@ def measure_dense(
     rest = ~np.any([*owned, np.zeros(len(mesh.faces), bool)], axis=0)
     added = tuple(p.name for p in subject.parts if p.name not in found)
     samples = sum(len(r) for p in pairs for r in p.rest)
+    parted, sealed = free.most if free is not None else (None, None)
     return DenseErrors(
         found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking, turned,
-        tuple(n for n in changed if n in sources), apart, *(free.most if free is not None else ()),
+        tuple(n for n in changed if n in sources), apart, parted, sealed,
+        otherwise, stiff,
     )  # fmt: skip
 
 
@@ -180,14 +202,6 @@ def _posed(subject: Subject, shape: str, number: int) -> Floats:
 
 def _greater(one: Spot | None, other: Spot) -> Spot:
     return other if one is None or other.mm > one.mm else one
-
-
-def without_correctives(head: HeadData) -> tuple[HeadData, list[str]]:
-    """The head without its correctives, and the shapes that these change when they are shown alone."""
-    rules = [r for r in head.rules if PRODUCT in r.group]
-    pairs = [set(r.group.split(PRODUCT)) for r in rules]
-    changed = [n for n in SHAPES if any(pair <= {k for k, v in pose_of(n).items() if v} for pair in pairs)]
-    return replace(head, rules=[r for r in head.rules if r not in rules]), changed
 
 
 def _outside_folds(both: list[tuple[Floats, Bools]]) -> tuple[Errors, Errors]:
@@ -238,7 +252,16 @@ def _folded(mesh: FitMesh, part: FittedPart) -> Bools:
     alone = np.diff(mix.indptr) == 1  # samples that are a vertex
     out = np.zeros(len(mesh.vertices), bool)
     out[mix.indices[mix.indptr[:-1][alone & part.chart.folded]]] = True
+    out[part.chart.inner] = True
     return out
+
+
+def _bridges(part: FittedPart, uv: Floats) -> Bools:
+    """(m,) which places of a wrapped skin span a gap of the mesh, as below the root of a tongue; of no other part."""
+    chart = part.chart
+    if not len(chart.inner):
+        return np.zeros(len(uv), bool)
+    return np.asarray(chart.folded[cKDTree(chart.uv).query(uv)[1]], bool)
 
 
 def _cut_off(mesh: FitMesh, part: FittedPart, data: PartData) -> Bools:
@@ -249,17 +272,6 @@ def _cut_off(mesh: FitMesh, part: FittedPart, data: PartData) -> Bools:
     alone = np.flatnonzero(np.diff(chart.mix.indptr) == 1)
     gone = alone[~domain_of(data).inside(chart.uv[alone])]
     out[chart.mix.indices[chart.mix.indptr[gone]]] = True
-    return out
-
-
-def _displacement(mesh: FitMesh, sources: dict[str, list[int]], shape: str) -> Floats:
-    """(n, 3) of the mesh's vertices in the pose that shows a shape."""
-    amounts = {n: v for n, v in pose_of(shape).items() if n in sources} if shape != NEUTRAL else {}
-    if shape == "tongueOut" and "jawOpen" in sources:  # opens the jaw as far as it needs
-        amounts["jawOpen"] = TONGUE_JAW
-    out = np.zeros_like(mesh.vertices)
-    for name, amount in amounts.items():
-        out += amount * mesh.deltas[sources[name]].sum(axis=0)
     return out
 
 

@@ -81,6 +81,11 @@ class Spot:
         return f"{self.mm:.2f} mm: {self.shape_in_words}, {self.place} ({self.part}, {way})"
 
     @property
+    def at_most(self) -> str:
+        """How far at most, in which shape and where."""
+        return f"{self.mm:.2f} mm at most: {self.shape_in_words}, {self.place} ({self.part})"
+
+    @property
     def shape_in_words(self) -> str:
         """The shape as a report names it."""
         return "the neutral face" if self.shape == NEUTRAL else f"shape {self.shape}"
@@ -113,11 +118,15 @@ class DenseErrors:
     samples : measured in every shape, both ways.
     sticking : by part and shape, (k, 2) in (u, v): vertices of the surface that are further from the mesh than a limit.
     turned : by part and shape, the area that is inside out.
-    corrected : shapes that correctives of the head change on purpose; they were measured without these.
+    corrected : shapes that correctives of the head, and rules of its tongue, change on purpose; they were measured
+        without these.
     apart : the greatest outside folds without contacts, which move lips, lids and tongue on purpose where the mesh's
         pass through each other or an eyeball.
     parted, sealed : the vertices that contacts move furthest on purpose: those that they keep out of each other or of
         an eyeball, and those of lips that they keep together.
+    otherwise : the vertex that correctives and rules of the tongue move furthest in a shape alone.
+    stiff : the vertex of the mesh that its own shapes move furthest from where a part that follows skull or jaw as a
+        whole has it; such a part is measured without that.
     """
 
     parts: dict[str, dict[str, Both]]
@@ -132,6 +141,8 @@ class DenseErrors:
     apart: Spot | None = None
     parted: Spot | None = None
     sealed: Spot | None = None
+    otherwise: Spot | None = None
+    stiff: Spot | None = None
 
     def lines(self) -> list[str]:
         """In words: the greatest errors, what the mesh does not have, and what was left out of it."""
@@ -140,12 +151,16 @@ class DenseErrors:
             out.append(f"without contacts, which keep lips, lids and tongue from passing through: {self.apart}")
         for what, spot in (("what would pass through itself", self.parted), ("lips that stay together", self.sealed)):
             if spot and spot.mm >= REPORTED_MM:
-                at = f"{spot.shape_in_words}, {spot.place} ({spot.part})"
-                out.append(f"contacts move {what} on purpose by {spot.mm:.2f} mm at most: {at}")
+                out.append(f"contacts move {what} on purpose by {spot.at_most}")
         if self.worst_fold:
             out.append(f"in folds (nostrils, ear canals, corners), which are held only loosely: {self.worst_fold}")
         if self.corrected:
-            out.append(f"changed on purpose by correctives, and measured without them: {', '.join(self.corrected)}")
+            named = ", ".join(self.corrected)
+            out.append(f"changed on purpose by correctives and the tongue's rules, and measured without them: {named}")
+            out += [f"they move a point by {self.otherwise.at_most}"] if self.otherwise else []
+        if self.stiff and self.stiff.mm >= REPORTED_MM:
+            why = "follow skull or jaw as a whole, on purpose, and were measured against the mesh moved so"
+            out.append(f"parts {why}: its own shapes move it otherwise by {self.stiff.at_most}")
         out += [f"not in the mesh, so not measured: {', '.join(self.added)}"] if self.added else []
         return out + (
             [f"faces of the mesh that no fitted part holds: {', '.join(self.left_out)}"] if self.left_out else []

@@ -71,6 +71,7 @@ class Chart:
     cuts : slits of the chart. slopes : derivatives that the surface should have; None: only positions are fitted.
     between : places all over the chart where the surface is compared with the mesh between the samples.
     importance : (m,) factor of each sample's error when control points are added; None: 1 for all.
+    inner : (k,) vertices of the mesh that lie inside what a skin was wrapped round, and count as folded.
     """
 
     uv: Floats
@@ -84,6 +85,7 @@ class Chart:
     slopes: Slopes | None = None
     between: Places | None = None
     importance: Floats | None = None
+    inner: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
 
     def hole_near(self, vertices: Floats, eye: Floats) -> int:
         """Number of the loop whose mean, over mesh vertices (n, 3), is nearest to an eyeball's centre (3,)."""

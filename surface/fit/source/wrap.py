@@ -21,6 +21,7 @@ OVERLAP = 0.125  # of the way around, on either side, is sampled twice, so that 
 ROOT, TIP_SHARE = 0.12, 0.22  # of the length: where the line begins, and how far before the tip it ends
 HEIGHT = 0.5  # of the line between the lowest and the highest place
 BOW = np.radians(45.0)  # how far below straight ahead the last ray points, so that the pole lies under the tip
+INSIDE = 0.02  # of a vertex' distance from the line: skin so much further out hides it
 END = 0.997  # of u: a tiny hole at the tip's pole is left out, so that normals are defined everywhere
 
 
@@ -35,7 +36,7 @@ def wrap_chart(mesh: FitMesh, islands: list[Island]) -> Chart:
     loop = np.array([[0.0, 0.0], [END, 0.0], [END, 1.0], [0.0, 1.0]])
     sewn = np.array([-1, -2, -2, -1])  # both long sides are one line
     weight = np.where(uv[:, 0] == 1.0, BORDER_WEIGHT, np.where(which < 0, FOLD_WEIGHT, 1.0))
-    return Chart(uv, mix, weight, spacing, which < 0, [loop], [sewn])
+    return Chart(uv, mix, weight, spacing, which < 0, [loop], [sewn], inner=_inner(mesh.vertices, corners))
 
 
 def _rays(points: Floats) -> tuple[Floats, Floats, Floats]:
@@ -53,6 +54,21 @@ def _rays(points: Floats) -> tuple[Floats, Floats, Floats]:
     u = np.linspace(0.0, 1.0, len(along))
     uv = np.stack(np.meshgrid(u, v, indexing="ij"), axis=-1).reshape(-1, 2)
     return np.repeat(origins, AROUND, axis=0), rays.reshape(-1, 3), uv
+
+
+def _inner(vertices: Floats, corners: Ints) -> Ints:
+    """Vertices of triangles ``corners (t, 3)`` that no skin around the line can lie on: others are further out in the
+    same direction, as where the underside has a groove, or they are behind the line's beginning, as the root is."""
+    own = np.unique(corners)
+    points = vertices[own]
+    low, high = points.min(axis=0), points.max(axis=0)
+    origins = np.tile(low + HEIGHT * (high - low), (len(own), 1))
+    first, last = low[2] + np.array([ROOT, 1.0 - TIP_SHARE]) * (high[2] - low[2])
+    origins[:, 2] = np.clip(points[:, 2], first, last)
+    distance, *_ = intersect(vertices[corners], origins, points - origins)
+    hidden = np.nan_to_num(distance, nan=0.0).max(axis=1, initial=0.0) > 1.0 + INSIDE
+    inner: Ints = own[hidden | (points[:, 2] < first)]
+    return inner
 
 
 def _hits(tri: Floats, origins: Floats, rays: Floats) -> tuple[Ints, Floats]:

@@ -130,7 +130,7 @@ class Contact:
     places : (2, columns, rows, 2) samples in (u, v), the upper side first, columns in the order of x, rows from the
         rim on; two thirds of the rows can touch the other side, in the rest the correction fades out.
     cling : whether lids are also brought back onto the eyeball when shapes lift them off; if not, they only stay out of
-        it.
+        it. Lips that are slightly apart at rest are closed over their whole length; if not, less towards the corners.
     seal : of lips; None for sides that only stay apart.
     """
 

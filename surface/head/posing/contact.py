@@ -27,6 +27,7 @@ SOFT_MM = 0.1
 OVERLAP_MM = (0.28, 0.9)  # allowed overlap of lips and of lids: triangles cut about that off the edges of both sides
 NEARLY_MM = 1.2  # lips nearer than this at rest count as closed
 HIDDEN_MM = 0.25  # by which each of two closed lips hides the other
+_CORNER_COLUMNS = 3.0  # from a corner, over which lips of a mesh that leaves them apart begin to be closed
 PASSES, TOLERANCE_MM = 3, 0.1  # corrections are repeated while bending leaves more than this
 LIFT_GAIN = 1.6  # corrections of lids are multiplied by it, because regularised least squares fall short
 LID_MM = 1.2  # thickness of a lid: skin that is nearer to the eyeball at rest never sinks further
@@ -114,7 +115,7 @@ class ContactSolver:
                          np.zeros((len(self._sides.ids), 3)), *np.zeros((2, 2, columns)))  # fmt: skip
         trace_profiles(self._sides.samples, rows, self._sides.radius, self._opening[0])
         find_gaps(self._opening[0], self._opening[4])
-        close_nearly(self._opening[4])
+        close_nearly(self._opening[4], np.ones(columns) if contact.cling else corner_fade(columns))
         self.push = np.zeros(4 * columns * profiles[2] if lids else 2 * columns)
         self._press, self._rows = OVERLAP_MM[lids], rows
 
@@ -191,11 +192,22 @@ class Follower:
         follow_samples(self.ids, self._beside, self._share, push, self._size, self.eye, self.radius, points)
 
 
-def close_nearly(gaps: Floats) -> None:
+def close_nearly(gaps: Floats, firm: Floats) -> None:
     """Make gaps at rest (2, k), mm, of sides that nearly touch everywhere those of sides that do, in place: an identity
-    mixed into a head may leave its lips some tenths of a millimetre apart, which no expression could close then."""
+    mixed into a head may leave its lips some tenths of a millimetre apart, which no expression could close then.
+
+    firm : (k,) 0..1, by which share in each column.
+    """
     if gaps.max() < NEARLY_MM:
-        np.minimum(gaps, -HIDDEN_MM, out=gaps)
+        gaps[:] = (1.0 - firm) * gaps + firm * np.minimum(gaps, -HIDDEN_MM)  # exactly the latter where firm is 1
+
+
+def corner_fade(columns: int) -> Floats:
+    """Return (columns,): 0 at both corners of an opening, 1 from some columns inwards. Where the sides of a mesh are
+    apart close to a corner, which cannot move, closing them there would fold the skin beside it."""
+    from_corner = np.minimum(np.arange(columns), np.arange(columns)[::-1])
+    fade: Floats = smoothstep(from_corner / _CORNER_COLUMNS)
+    return fade
 
 
 def eye_of(contact: Contact, head: HeadData) -> tuple[Floats, float]:

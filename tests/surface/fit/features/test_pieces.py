@@ -139,6 +139,22 @@ def test_a_strip_whose_net_lies_far_beside_it_does_not_keep_to_the_eyeball(fitte
     assert skin_part(recipe(), chart, wild, eyes).lids.any()
 
 
+def test_a_strip_that_a_shape_takes_through_the_eyeball_does_not_keep_to_it(fitted):
+    """A few control points far beside the strip, on their way past the eyeball, would be pushed out of it and take the
+    strip along; of a strip whose shapes stay outside, all keep to it."""
+    mesh, chart, _ = fitted
+    fit = fit_chart(mesh, chart, FitRequest(600, coarse=0.1))
+    middle = fit.points[np.argmin(np.linalg.norm(fit.points[:, :2], axis=1))]
+    eyes = rig(np.array([middle - [0.0, 0.0, 14.0], middle - [200.0, 0.0, 14.0]]))
+    part = recipe(material="lash")
+    assert skin_part(part, chart, fit, eyes).lids.any()
+    near = np.argsort(np.linalg.norm(fit.points - middle, axis=1))[:4]
+    moves = fit.moves.copy()
+    moves[0, near] += [0.0, 0.0, -9.0]
+    assert not skin_part(part, chart, replace(fit, moves=moves), eyes).lids.any()
+    assert skin_part(recipe(), chart, replace(fit, moves=moves), eyes).lids.any(), "a lid has to"
+
+
 def test_only_a_tongue_that_is_skin_gets_groups_to_put_it_out(fitted):
     _, chart, fit = fitted
     path = np.array([[-50.0, 0, 0, 10, 1, 1, 0], [0, 0, 0, 30, 1, 1, 0], [50, 0, 0, 60, 0.5, 0.5, 4]])

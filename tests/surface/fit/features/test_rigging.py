@@ -201,6 +201,6 @@ def test_the_tongue_draws_back_before_a_lip_that_rolls_in_its_tip_the_furthest()
     points = np.column_stack([np.zeros(5), np.full(5, -41.0), [20.0, 50.0, 70.0, 89.0, 98.0]])
     path = np.array([[z, -41.0, -41.0, z, 1.0, 1.0, 0.0] for z in (30.0, 50.0, 65.0, 79.0, 89.0, 98.0)])
     group = drawn_back_tongue(points, path, 3.0)
-    assert group.name == "mouthRollLower" and group.ids.tolist() == [2, 3, 4]
+    assert group.name == "tongueBack" and group.ids.tolist() == [2, 3, 4]
     assert not group.moves[:, :2].any() and group.moves[0, 2] < 0.0
     np.testing.assert_allclose(group.moves[1:, 2], -3.0)

@@ -93,8 +93,10 @@ def test_correctives_that_change_a_shape_on_purpose_are_left_out_and_named(resul
     )  # fmt: skip
     dense = measure_dense(head, mesh, sources_of(mesh.names), result.parts)
     assert dense.worst == result.report.dense.worst and dense.corrected == (name,)
-    line = f"changed on purpose by correctives, and measured without them: {name}"
+    line = f"changed on purpose by correctives and the tongue's rules, and measured without them: {name}"
     assert line in dense.lines() and line not in result.report.dense.lines()
+    far = measure_dense(head, mesh, sources_of(mesh.names), result.parts, fit_alone=True).otherwise
+    assert far.shape == name and far.mm == pytest.approx(9.0, abs=1.5), "contacts may add to it"
     other = replace(head, rules=[*result.head.rules, Rule(own.replace("*", "+"), ({name: 1.0}, {name: 1.0}))])
     assert measure_dense(other, mesh, sources_of(mesh.names), result.parts).corrected == ()
 

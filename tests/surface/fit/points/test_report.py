@@ -143,7 +143,7 @@ def test_errors_are_told_line_by_line():
         f"greatest error {spot(2.0)}",
         f"without contacts, which keep lips, lids and tongue from passing through: {spot(1.0)}",
         f"in folds (nostrils, ear canals, corners), which are held only loosely: {spot(3.0)}",
-        "changed on purpose by correctives, and measured without them: e, f",
+        "changed on purpose by correctives and the tongue's rules, and measured without them: e, f",
         "not in the mesh, so not measured: a, b",
         "faces of the mesh that no fitted part holds: c, d",
     ]

@@ -149,3 +149,17 @@ def test_triangles_and_squares_are_wrapped_alike():
     for by in (7, 300):  # whichever face comes first
         turned = [Island(i.vertex, i.uv, np.roll(i.faces, by, axis=0)) for i in islands]
         np.testing.assert_array_equal(wrap_chart(mesh, turned).weight, whole.weight)
+
+
+def test_vertices_that_lie_inside_the_skin_or_behind_its_beginning_are_inner() -> None:
+    """A groove below: its two walls and its bottom are vertices that no skin around the tongue reaches."""
+    mesh, islands = body()
+    outer = wrap_chart(mesh, islands).inner
+    assert np.all(mesh.vertices[outer][:, 2] < 35.0 + 60.0 * wrap.ROOT), "of a convex one, its root alone"
+    sheet = np.array([[-4.0, -45.0, 60.0], [4.0, -45.0, 60.0], [4.0, -45.0, 70.0], [-4.0, -45.0, 70.0]])
+    n = len(mesh.vertices)
+    own = Island(np.arange(n, n + 4), np.zeros((4, 2)), np.array([[0, 1, 2, 3]]))
+    more = FitMesh(np.concatenate([mesh.vertices, sheet]), np.concatenate([mesh.faces, [[n, n + 1, n + 2, n + 3]]]),
+                   mesh.uv, np.zeros((len(mesh.faces) + 1, 4), int), (), np.zeros((0, n + 4, 3)))  # fmt: skip
+    inner = wrap_chart(more, [*islands, own]).inner
+    assert set(inner) == {*outer, n, n + 1, n + 2, n + 3}

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_head import small_head
@@ -22,6 +24,7 @@ from surface.head.posing.contact import (
     Follower,
     by_lanes,
     contact_rows,
+    corner_fade,
     height_limits,
     tile_weights,
     weights_at,
@@ -401,6 +404,24 @@ def test_a_seal_closes_sides_that_an_identity_left_slightly_apart() -> None:
     ContactSolver(contact(), surface, small_head()).apply(AHEAD, points, 1.0)
     upper, lower = rims(surface, points)
     assert (upper - lower).max() < -0.5 * HIDDEN_MM
+
+
+def test_a_meshs_own_lips_that_are_slightly_apart_are_closed_in_the_middle_and_left_at_the_corners() -> None:
+    """The skin beside a corner would be folded otherwise, for the corner itself cannot move."""
+    surface = lips(-0.4)
+    gaps = []
+    for own in (replace(contact(), cling=False), contact()):
+        solver = ContactSolver(own, surface, small_head())
+        solver.apply(AHEAD, surface.points.copy(), 1.0)
+        gaps.append(solver.gaps()[0])
+    ends, middle = [0, -1], slice(4, 7)
+    assert (gaps[0][ends] > 0.2).all() and (gaps[0][middle] < -0.5 * HIDDEN_MM).all()
+    assert (gaps[1] < -0.4 * HIDDEN_MM).all(), "an identity's are closed everywhere"
+    assert (np.diff(corner_fade(COLUMNS)[:6]) >= 0.0).all() and corner_fade(COLUMNS)[[0, 3, -1]].tolist() == [
+        0.0,
+        1.0,
+        0.0,
+    ]
 
 
 def test_a_seal_leaves_an_opening_that_stands_open_at_rest() -> None:
