@@ -11,8 +11,8 @@ from scipy.sparse import csr_matrix, identity
 from surface.base.arrays import Floats, Ints
 from surface.dcp import DCPSurface
 from surface.fit.points.solve import normal_equations
-from surface.fit.transfer.finer_mesh import FineMesh
-from surface.fit.transfer.split_points import how_many, split_points
+from surface.fit.transfer.detail.finer_mesh import FineMesh
+from surface.fit.transfer.detail.split_points import how_many, split_points
 from surface.head import Jaw, PartData
 from surface.head.model.meshes import make_surface
 

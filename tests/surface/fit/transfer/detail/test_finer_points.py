@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from small_head import JAW, part
 
-from surface.fit.transfer import finer_points as module
-from surface.fit.transfer.finer_mesh import FineMesh
-from surface.fit.transfer.finer_points import centres, fit_points
+from surface.fit.transfer.detail import finer_points as module
+from surface.fit.transfer.detail.finer_mesh import FineMesh
+from surface.fit.transfer.detail.finer_points import centres, fit_points
 from surface.head.model.meshes import make_surface
 
 U, V = (a.ravel() for a in np.meshgrid(*2 * [np.linspace(0, 1, 41)], indexing="ij"))
