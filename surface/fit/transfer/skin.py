@@ -15,6 +15,7 @@ from surface.fit.features.rigging import lid_share
 from surface.fit.transfer.detail.cover import Sheet, cover
 from surface.fit.transfer.detail.finer_mesh import finer_mesh
 from surface.fit.transfer.detail.finer_points import fit_points
+from surface.fit.transfer.detail.uncross import uncrossed
 from surface.fit.transfer.register import Matcher
 from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.warp import Warp
@@ -29,6 +30,7 @@ RIM_MM = (1.5, 4.0)  # distance from the rim of an opening where detail of the s
 CLOSINGS = 12  # iterations, because each one leaves a share of the gap
 ON_MM = (1.5, 0.5)  # distance from the nearest sample, and from its tangent plane, of skin that lies on the scan
 FREE_MM = 6.0  # least distance from the rims of openings of skin that goes where the scan lacks it
+FRONT_MM = 6.0  # distance from what the scan shows of the face's front, within which skin stays though it crosses
 LIP_FADE_MM = (3.0, 16.0)  # distance from the line of the lips up to which skin moves with them, and where it is still
 NEAR, NEAR_MM = 6, 12.0  # nearest points of the skin that another part follows, and distance at which it no longer does
 
@@ -91,6 +93,13 @@ class Skin:
         on = match.found & (np.linalg.norm(match.goals - self.at, axis=1) < ON_MM[1] * scale)
         sheet = Sheet(self.mesh.triangles, self._steps, self._free)
         self.at = cover(sheet, self.at, ~on, samples.points, samples.normals)
+
+    def uncross(self, smooth: Warp, samples: Samples, scale: float) -> None:
+        """Move skin that passes through itself to where a stiffer map puts it, except at the samples of the scan's
+        front and at the rims of openings."""
+        tree = cKDTree(samples.points) if len(samples.points) else None
+        beside = np.ones(len(self.at), bool) if tree is None else tree.query(self.at)[0] > FRONT_MM * scale
+        self.at = uncrossed(self.at, smooth(self.rest), self.rest, self.mesh.triangles, beside & self._free)
 
     def _facing(self, at: Floats) -> Floats:
         """(t, 3) unit normals of the skin's triangles over vertices (n, 3)."""

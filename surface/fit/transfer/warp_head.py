@@ -43,7 +43,7 @@ def warp_head(
     data = head.data
     old, new = Ball(data.eyes, data.eye_radius), Ball(*place_eyes(template, warp))
     front = shown.kept(on_front(warp(template.points[face_region(template)]), shown))
-    skins, finer = _skins(head, warp, matcher, front, old, new)
+    skins, finer = _skins(head, warp, smooth, matcher, front, old, new)
     lips = next(c for c in data.contacts if c.name == "lips")
     face = skins[lips.part]
     crowns = [p.vertices for p in head.parts if p.material == "teeth"]
@@ -77,7 +77,7 @@ def warp_head(
 
 
 def _skins(
-    head: Head, warp: Warp, matcher: Matcher, front: Samples, old: Ball, new: Ball
+    head: Head, warp: Warp, smooth: Warp, matcher: Matcher, front: Samples, old: Ball, new: Ball
 ) -> tuple[dict[str, Skin], dict[str, PartData]]:  # fmt: skip
     """The visible parts of skin, moved onto the scan, and the same parts of the head with as many control points as
     they need there; both by name. front : samples of the scan on the front of the face."""
@@ -90,6 +90,7 @@ def _skins(
             skin.follow(matcher, scale)
             if part.name == lips.part:
                 skin.cover(matcher, front, scale)
+                skin.uncross(smooth, front, scale)
             skin.at = seat_on_eyeballs(skin.at, skin.rest, old, new)
             finer[part.name] = skin.solve(data[part.name], head.data.jaw)
             if part.name == lips.part:
