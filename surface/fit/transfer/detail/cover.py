@@ -27,8 +27,8 @@ FEWEST = 3  # samples of a place
 DEEP_MM = 15.0  # greatest depth of skin before or behind a bare place
 WIDE_MM = 25.0  # greatest distance from it of skin that goes along
 BESIDE_MM = 1.5  # greatest distance from a sample, seen along the place's direction
-FLAT = 0.2  # least cosine between a sample's normal and the direction of its place
-SMOOTH = 0.1  # weight of smoothness, relative to that of the goals
+FLAT = 0.5  # least cosine between a sample's normal and the direction of its place
+SMOOTH = 8.0  # weight of smoothness, relative to that of the goals
 LESS = 0.85  # of a place's RMS distance, that may be left at most, for the skin to stay where it was brought
 NEAREST = 4  # samples that give the height of the scan at a vertex
 VOTES = 3  # rounds in which a vertex that lies on the scan by chance, among others that do not, is found
@@ -100,10 +100,12 @@ def bare_places(at: Floats, triangles: Ints, points: Floats, normals: Floats) ->
 
 
 def _voted(off: Bools, step: csr_matrix) -> Bools:
-    """``off (n,)``, and vertices most of whose neighbours are off: they lie on the scan by chance."""
+    """``off (n,)``, vertices most of whose neighbours are off, which lie on the scan by chance, and one ring around
+    them, so that walls of a pit are no zigzag."""
     for _ in range(VOTES):
         off = off | (off - step @ off.astype(float) > 0.5)
-    return off
+    out: Bools = off | (step @ off.astype(float) != 0.0)
+    return out
 
 
 def _around(at: Floats, off: Bools, step: csr_matrix, place: Bare) -> Ints:

@@ -43,8 +43,8 @@ def test_skin_is_brought_to_what_it_does_not_reach(start: str) -> None:
     off = np.abs(skin - scan).max(axis=1) > 0.5
     assert farthest(skin, scan) > 2.5
     made = cover(sheet(), skin, off, scan, UP)
-    assert farthest(made, scan) < 0.9
-    np.testing.assert_array_equal(made[BEYOND > 8.0], skin[BEYOND > 8.0])
+    assert farthest(made, scan) < module.BARE_MM
+    np.testing.assert_array_equal(made[BEYOND > 9.0], skin[BEYOND > 9.0])
     tri = made[TRIANGLES]
     turned = np.cross(tri[:, 1] - tri[:, 0], tri[:, 2] - tri[:, 0])[:, 2]
     assert turned.min() > -1e-9  # nothing is folded
