@@ -20,6 +20,7 @@ from surface.fit.source.placing.frame import AXES, EYES_MM, UNITS
 from surface.fit.source.placing.place import HeadSize
 from surface.fit.transfer.align import Similarity, align, from_pairs
 from surface.fit.transfer.colours import with_colours
+from surface.fit.transfer.detail.hidden import in_sight
 from surface.fit.transfer.faults import HINT, faults_of_transfer
 from surface.fit.transfer.lids import close_lids
 from surface.fit.transfer.lining import keep_lining_behind
@@ -111,9 +112,9 @@ def transfer(
     found, mirrored = upright(scan, template, found)
     scan, marks = in_frame(scan, template, found), {n: found.points(p) for n, p in picked.items()}
     samples, done = _registered(scan, template, marks, progress, mirrored=mirrored)
-    matcher = Matcher(samples)
+    matcher, shown = Matcher(samples), samples.kept(in_sight(scan, samples.points))
     provenance = {**head.data.provenance, "made": f"omote fit: form of a scan, expressions of the head {head.name!r}"}
-    warped = warp_head(head, template, done.warp, done.smooth, matcher, provenance, name)
+    warped = warp_head(head, template, done.warp, done.smooth, matcher, shown, provenance, name)
     progress("lids", 0.75)
     data, mended = _with_lids_and_lining(warped, head.data)
     changed = reseated(warped, data)
@@ -124,7 +125,7 @@ def transfer(
     if scan.colours is not None:
         data, colour_notes = with_colours(data, scan.colours)
         notes += colour_notes
-    parts = face_reports(data, template, done.warp, samples)
+    parts = face_reports(data, template, done.warp, shown)
     registered = registration_errors(template, done, matcher, STAGES[-1].farthest)
     faults = tuple(faults_of_transfer(parts, registered[1], data, head))
     face = Head(data)

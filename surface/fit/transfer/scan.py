@@ -65,6 +65,10 @@ class Samples:
     normals: Floats
     border: Bools
 
+    def kept(self, chosen: Bools) -> Samples:
+        """The samples that a mask (m,) chooses."""
+        return Samples(self.points[chosen], self.normals[chosen], self.border[chosen])
+
 
 def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
     """Read the skin of a mesh; pieces named as clothes, hair, teeth or other parts that are not skin are left out.

@@ -5,16 +5,19 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix, diags
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, diags
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.dcp import DCPSurface
 from surface.fit.features.rigging import lid_share
-from surface.fit.transfer.finer_mesh import finer_mesh
-from surface.fit.transfer.finer_points import fit_points
+from surface.fit.transfer.detail.cover import Sheet, cover
+from surface.fit.transfer.detail.finer_mesh import finer_mesh
+from surface.fit.transfer.detail.finer_points import fit_points
+from surface.fit.transfer.detail.uncross import uncrossed
 from surface.fit.transfer.register import Matcher
+from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.warp import Warp
 from surface.head import Contact, Head, HeadPart, Jaw, PartData
 from surface.head.model.parameters import smoothstep
@@ -25,6 +28,9 @@ FOLDED = 0.3  # least cosine between a triangle's normal before and after follow
 UNFOLDINGS, STILL = 4, 0.1  # attempts of a pass to remove folds; weight that keeps skin at folds where the map puts it
 RIM_MM = (1.5, 4.0)  # distance from the rim of an opening where detail of the scan begins to count, and counts fully
 CLOSINGS = 12  # iterations, because each one leaves a share of the gap
+ON_MM = (1.5, 0.5)  # distance from the nearest sample, and from its tangent plane, of skin that lies on the scan
+FREE_MM = 6.0  # least distance from the rims of openings of skin that goes where the scan lacks it
+FRONT_MM = 6.0  # distance from what the scan shows of the face's front, within which skin stays though it crosses
 LIP_FADE_MM = (3.0, 16.0)  # distance from the line of the lips up to which skin moves with them, and where it is still
 NEAR, NEAR_MM = 6, 12.0  # nearest points of the skin that another part follows, and distance at which it no longer does
 
@@ -53,8 +59,11 @@ class Skin:
         distance = cKDTree(rims).query(self.rest)[0] if len(rims) else np.full(n, np.inf)
         self.points = part.surface.points.copy()
         # lids keep their own form, because those of a scan are joined to its eyes, or lie inside an eyeball
-        self._seen = smoothstep(distance, *RIM_MM) * (1.0 - np.abs(lid_share(self.rest, eyes.centres, eyes.radius)))
-        self._matrix = _laplacian(self.mesh.triangles, n)
+        lids = np.abs(lid_share(self.rest, eyes.centres, eyes.radius))
+        self._seen = smoothstep(distance, *RIM_MM) * (1.0 - lids)
+        self._free = (distance > FREE_MM) & (lids == 0.0)
+        self._steps = _steps(self.mesh.triangles, n)
+        self._matrix = (self._steps.T @ self._steps).tocsr()
 
     def follow(self, matcher: Matcher, scale: float) -> None:
         """Move the skin along its normals to the scan where the scan has data, and interpolate smoothly elsewhere.
@@ -76,6 +85,21 @@ class Skin:
                     break
                 folds |= more
             self.at = at
+
+    def cover(self, matcher: Matcher, samples: Samples, scale: float) -> None:
+        """Move the skin to those samples of the scan that none of it is near, such as pits and closed nostrils, outside
+        openings and lids. scale : size of the new head, relative to the one the skin comes from."""
+        match = matcher.find(self.at, self.normals(), ON_MM[0] * scale, 0.0)
+        on = match.found & (np.linalg.norm(match.goals - self.at, axis=1) < ON_MM[1] * scale)
+        sheet = Sheet(self.mesh.triangles, self._steps, self._free)
+        self.at = cover(sheet, self.at, ~on, samples.points, samples.normals)
+
+    def uncross(self, smooth: Warp, samples: Samples, scale: float) -> None:
+        """Move skin that passes through itself to where a stiffer map puts it, except at the samples of the scan's
+        front and at the rims of openings."""
+        tree = cKDTree(samples.points) if len(samples.points) else None
+        beside = np.ones(len(self.at), bool) if tree is None else tree.query(self.at)[0] > FRONT_MM * scale
+        self.at = uncrossed(self.at, smooth(self.rest), self.rest, self.mesh.triangles, beside & self._free)
 
     def _facing(self, at: Floats) -> Floats:
         """(t, 3) unit normals of the skin's triangles over vertices (n, 3)."""
@@ -124,15 +148,15 @@ def _solved(system: csc_matrix, right: Floats) -> Floats:
     return x
 
 
-def _laplacian(triangles: Ints, n: int) -> coo_matrix:
-    """(n, n) squared graph Laplacian of triangles, normalised."""
+def _steps(triangles: Ints, n: int) -> csr_matrix:
+    """(n, n) steps to each of the corners of triangles from the mean of its neighbours; its square is the squared graph
+    Laplacian, normalised."""
     a = np.concatenate([triangles, triangles[:, ::-1]]).reshape(-1, 3)
     i, j = np.concatenate([a[:, 0], a[:, 1], a[:, 2]]), np.concatenate([a[:, 1], a[:, 2], a[:, 0]])
     links = coo_matrix((np.ones(len(i)), (i, j)), shape=(n, n)).tocsr()
     links.data[:] = 1.0
     share = diags(1.0 / np.maximum(np.asarray(links.sum(axis=1)).ravel(), 1.0)) @ links
-    step = diags(np.ones(n)) - share
-    return (step.T @ step).tocsr()
+    return (diags(np.ones(n)) - share).tocsr()
 
 
 def close_lips(skin: Skin, contact: Contact, scale: float) -> None:

@@ -10,8 +10,11 @@ from dataclasses import replace
 import numpy as np
 
 from surface.base.arrays import Floats
+from surface.fit.transfer.align import face_region
+from surface.fit.transfer.detail.front import on_front
 from surface.fit.transfer.place_parts import behind_skin, place_eyes, place_jaw, place_neck, place_teeth
 from surface.fit.transfer.register import Matcher
+from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.skin import Ball, Skin, behind_lids, close_lips, follow_skin, rims_of, seat_on_eyeballs
 from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
@@ -29,15 +32,18 @@ LONGEST_MM = 2.2  # of the edges of triangles that follow a scan's detail
 
 
 def warp_head(
-    head: Head, template: Template, warp: Warp, smooth: Warp, matcher: Matcher, provenance: dict[str, str], name: str
+    head: Head, template: Template, warp: Warp, smooth: Warp, matcher: Matcher, shown: Samples,
+    provenance: dict[str, str], name: str,
 ) -> HeadData:  # fmt: skip
     """The head in the form that a map of space and the scan's detail give it.
 
     smooth : a stiffer map, by which displacements are rotated and stretched. matcher : finds the scan's detail.
+    shown : samples of the scan that are in sight from outside.
     """
     data = head.data
     old, new = Ball(data.eyes, data.eye_radius), Ball(*place_eyes(template, warp))
-    skins, finer = _skins(head, warp, matcher, old, new)
+    front = shown.kept(on_front(warp(template.points[face_region(template)]), shown))
+    skins, finer = _skins(head, warp, smooth, matcher, front, old, new)
     lips = next(c for c in data.contacts if c.name == "lips")
     face = skins[lips.part]
     crowns = [p.vertices for p in head.parts if p.material == "teeth"]
@@ -71,10 +77,10 @@ def warp_head(
 
 
 def _skins(
-    head: Head, warp: Warp, matcher: Matcher, old: Ball, new: Ball
+    head: Head, warp: Warp, smooth: Warp, matcher: Matcher, front: Samples, old: Ball, new: Ball
 ) -> tuple[dict[str, Skin], dict[str, PartData]]:  # fmt: skip
     """The visible parts of skin, moved onto the scan, and the same parts of the head with as many control points as
-    they need there; both by name."""
+    they need there; both by name. front : samples of the scan on the front of the face."""
     rims, scale = rims_of(head), new.radius / old.radius
     lips = next(c for c in head.data.contacts if c.name == "lips")
     data, out, finer = {p.name: p for p in head.data.parts}, {}, {}
@@ -82,6 +88,9 @@ def _skins(
         if part.follows == "skin" and part.material == "skin" and part.name != SOCKETS:
             skin = Skin(part, rims, warp, old, LONGEST_MM * scale)
             skin.follow(matcher, scale)
+            if part.name == lips.part:
+                skin.cover(matcher, front, scale)
+                skin.uncross(smooth, front, scale)
             skin.at = seat_on_eyeballs(skin.at, skin.rest, old, new)
             finer[part.name] = skin.solve(data[part.name], head.data.jaw)
             if part.name == lips.part:

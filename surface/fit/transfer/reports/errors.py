@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats
 from surface.fit.measures.closest import ClosestTree
 from surface.fit.points.report import PartReport, errors_of
-from surface.fit.transfer.align import face_region, foremost
+from surface.fit.transfer.align import face_region
+from surface.fit.transfer.detail.front import REACH_MM, on_front
 from surface.fit.transfer.register import LEAST_COSINE
 from surface.fit.transfer.reports.distances import CLOSE_MM, distances_from, sample_head
 from surface.fit.transfer.scan import Samples, Scan
@@ -16,8 +16,6 @@ from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
 from surface.head import Head, HeadData
 
-REACH_MM, SEEN_MM = 20.0, 3.0  # samples further from the face are hair or clothes; width of a line of sight
-NEAR_MM = 6.0  # samples that lie further beside the front of the face, seen from the front, are ears or the crown
 EYES = 1.6  # distance from an eyeball's axis, in radii, within which samples belong to eyes and lids
 
 
@@ -27,6 +25,7 @@ def face_reports(data: HeadData, template: Template, warp: Warp, samples: Sample
     The first report is of the face, the second of eyes and lids. The head always has spherical eyeballs with lids that
     lie on them, whereas a scan may have flat, carved, closed or noisy eyes. So distances at the eyes are reported
     separately and do not count as errors of the face. The first report also has the number of all control points.
+    samples : those of the scan that are in sight from outside.
     """
     at, own = distances(Head(data), warp(template.points[face_region(template)]), samples)
     off = np.linalg.norm(at[:, None, :2] - data.eyes[:, :2], axis=2).min(axis=1)
@@ -39,13 +38,8 @@ def face_reports(data: HeadData, template: Template, warp: Warp, samples: Sample
 def distances(head: Head, front: Floats, samples: Samples) -> tuple[Floats, Floats]:
     """Samples (m, 3) of the scan that are visible from the front near the points ``front (k, 3)``, and their distances
     (m,) from the head's surface, mm."""
-    at, low, high = samples.points, front.min(axis=0), front.max(axis=0)
-    high[2] += REACH_MM
-    inside = ((at > low) & (at < high)).all(axis=1) & (samples.normals[:, 2] > 0.2)
-    inside[inside] = foremost(at[inside], SEEN_MM)
-    inside &= ~samples.border
-    inside[inside] = cKDTree(front[:, :2]).query(at[inside, :2], distance_upper_bound=NEAR_MM)[0] < NEAR_MM
-    at = at[inside]
+    inside = on_front(front, samples)
+    at = samples.points[inside]
     own = sample_head(head)
     found = distances_from(own, at)
     same = (own.normals[found.nearest] * samples.normals[inside]).sum(axis=1) > LEAST_COSINE

@@ -4,11 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_matrix
 from small_head import JAW, part
 
-from surface.fit.transfer import finer_points as module
-from surface.fit.transfer.finer_mesh import FineMesh
-from surface.fit.transfer.finer_points import centres, fit_points
+from surface.fit.transfer.detail import finer_points as module
+from surface.fit.transfer.detail.finer_mesh import FineMesh
+from surface.fit.transfer.detail.finer_points import centres, fit_points, gains
 from surface.head.model.meshes import make_surface
 
 U, V = (a.ravel() for a in np.meshgrid(*2 * [np.linspace(0, 1, 41)], indexing="ij"))
@@ -74,3 +75,28 @@ def test_noise_leaves_no_lumps() -> None:
     noise = np.random.default_rng(2).normal(scale=0.3, size=REST.shape) * [0, 0, 1.0]
     fitted = fit_points(PART, MESH, REST + noise, ALL, JAW)
     assert rms(fitted.at, REST) < 0.1
+
+
+def test_points_are_not_split_where_that_lowers_the_error_little(monkeypatch) -> None:
+    at = bump(4.0)
+    freely = fit_points(PART, MESH, at, ALL, JAW)
+    heard = []
+
+    def recorded(*args):
+        heard.append(gains(*args))
+        return heard[-1]
+
+    monkeypatch.setattr(module, "gains", recorded)
+    monkeypatch.setattr(module, "LEAST_GAIN_MM", 0.3)
+    fitted = fit_points(PART, MESH, at, ALL, JAW)
+    assert heard[0].min() < 0.3 < heard[0].max()
+    assert 25 < len(fitted.part.points) < len(freely.part.points)
+    np.testing.assert_allclose(make_surface(fitted.part).evaluate(MESH.uv), REST, atol=1e-9)
+    monkeypatch.setattr(module, "LEAST_GAIN_MM", 100.0)
+    assert len(fit_points(PART, MESH, at, ALL, JAW).part.points) == 25
+
+
+def test_gains_are_what_the_error_around_each_point_sinks_by() -> None:
+    shares = csr_matrix(np.array([[1.0, 0.0], [0.5, 0.5], [0.0, 1.0]]))
+    np.testing.assert_allclose(gains(shares, np.array([4.0, 4.0, 0.0]), np.array([1.0, 1.0, 0.0])),
+                               [1.0, np.sqrt(4.0 / 3) - np.sqrt(1.0 / 3)])  # fmt: skip

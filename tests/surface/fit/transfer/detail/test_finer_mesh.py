@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from small_head import sheet
 
-from surface.fit.transfer.finer_mesh import finer_mesh
+from surface.fit.transfer.detail.finer_mesh import finer_mesh
 
 SURFACE = sheet(0.0)
 U, V = (a.ravel() for a in np.meshgrid(*2 * [np.linspace(0, 1, 9)], indexing="ij"))

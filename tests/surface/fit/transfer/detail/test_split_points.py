@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import BSpline
 from small_head import JAW, part
 
-from surface.fit.transfer.split_points import halved, how_many, split_points
+from surface.fit.transfer.detail.split_points import halved, how_many, split_points
 from surface.head import Group, PartData
 from surface.head.model.meshes import make_surface
 from surface.head.posing.rig import jaw_path

@@ -11,8 +11,8 @@ from scipy.sparse import csr_matrix, identity
 from surface.base.arrays import Floats, Ints
 from surface.dcp import DCPSurface
 from surface.fit.points.solve import normal_equations
-from surface.fit.transfer.finer_mesh import FineMesh
-from surface.fit.transfer.split_points import how_many, split_points
+from surface.fit.transfer.detail.finer_mesh import FineMesh
+from surface.fit.transfer.detail.split_points import how_many, split_points
 from surface.head import Jaw, PartData
 from surface.head.model.meshes import make_surface
 
@@ -21,6 +21,7 @@ ROUNDS = 3  # of splitting points
 GROWTH = 1.8  # most points of a part, relative to those it had
 SHARE = 0.6  # of the points that are left to be added, how many a round adds
 ENOUGH_MM = 0.25  # RMS error around a control point up to which it is not split
+LEAST_GAIN_MM = 0.15  # by which splitting a control point lowers the RMS error around it, or it is not split
 CLOSEST_MM = 3.0  # least distance of the knots of a point that is split: finer ones would follow a scanner's noise
 MIN_SHARE = 0.04  # of a place, that a control point has to be counted there
 
@@ -36,26 +37,56 @@ class FittedPart:
     at: Floats
 
 
+@dataclass(frozen=True)
+class _Solved:
+    """A part with its surface, the places (k, 3) of its control points on the scan, its ``basis (n, k)`` at the samples
+    there, and the errors (n,) that are left, mm²."""
+
+    part: PartData
+    surface: DCPSurface
+    points: Floats
+    basis: csr_matrix
+    error: Floats
+
+
 def fit_points(part: PartData, mesh: FineMesh, at: Floats, counts: Floats, jaw: Jaw) -> FittedPart:
     """Fit a part's surface to skin ``at (n, 3)`` over a mesh, with more control points where it needs them.
 
     counts : (n,) 0..1, how much an error matters there. jaw : the path of the jaw, for its expressions.
     """
     most = int(GROWTH * len(part.points))
-    for left in range(ROUNDS, -1, -1):
-        surface = make_surface(part)
-        basis = surface.basis_matrix(mesh.uv, side=mesh.side)
-        points = surface.points + solve_moves(surface, basis, at - basis @ surface.points)
-        if not left:
-            break
-        error = counts * ((basis @ points - at) ** 2).sum(axis=1)
-        chosen = too_far_apart(part, basis, error, points)
-        room = most - len(part.points)
-        chosen = chosen[: how_many(part, chosen, room if left == 1 else int(SHARE * room))]
+    now = _solved(part, mesh, at, counts)
+    for left in range(ROUNDS, 0, -1):
+        chosen = too_far_apart(now.part, now.basis, now.error, now.points)
+        room = most - len(now.part.points)
+        chosen = chosen[: how_many(now.part, chosen, room if left == 1 else int(SHARE * room))]
         if not len(chosen):
             break
-        part = split_points(part, chosen, jaw)
-    return FittedPart(part, surface, points, basis @ points)
+        finer = _solved(split_points(now.part, chosen, jaw), mesh, at, counts)
+        useful = chosen[gains(now.basis[:, chosen], now.error, finer.error) > LEAST_GAIN_MM]
+        if not len(useful):
+            break
+        if len(useful) < len(chosen):
+            finer = _solved(split_points(now.part, useful, jaw), mesh, at, counts)
+        now = finer
+    return FittedPart(now.part, now.surface, now.points, now.basis @ now.points)
+
+
+def _solved(part: PartData, mesh: FineMesh, at: Floats, counts: Floats) -> _Solved:
+    """The part's surface fitted to skin ``at (n, 3)``."""
+    surface = make_surface(part)
+    basis = surface.basis_matrix(mesh.uv, side=mesh.side)
+    points = surface.points + solve_moves(surface, basis, at - basis @ surface.points)
+    return _Solved(part, surface, points, basis, counts * ((basis @ points - at) ** 2).sum(axis=1))
+
+
+def gains(shares: csr_matrix, before: Floats, after: Floats) -> Floats:
+    """(k,) by how much errors (n,), mm², sank around each of k control points, of which the samples have ``shares (n,
+    k)``: the difference of the RMS, mm."""
+    weight = np.maximum(np.asarray(shares.sum(axis=0)).ravel(), 1e-12)
+    first, last = (np.sqrt(np.maximum(shares.T @ e, 0.0) / weight) for e in (before, after))
+    gain: Floats = first - last
+    return gain
 
 
 def solve_moves(surface: DCPSurface, basis: csr_matrix, moves: Floats) -> Floats:

@@ -1,0 +1,46 @@
+"""Keep skin from passing through itself on a scan, as an ear does that hair hides.
+
+The map to a scan and the scan's detail are soft: two sides of an ear, or an ear and the neck, may be matched to one
+surface and come to lie in each other. A stiffer map keeps them apart, so skin goes back to it there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from surface.base.arrays import Bools, Floats, Ints
+from surface.check.crossings import Crossings
+from surface.head.model.parameters import smoothstep
+
+ROUNDS = 4
+BACK_MM = (3.0, 8.0)  # distance from what crosses up to which skin goes back fully, and from which on it stays
+SAME = 1e-6  # vertices that are nearer at rest, relative to the skin's size, are in one place
+
+
+def uncrossed(at: Floats, still: Floats, rest: Floats, triangles: Ints, able: Bools) -> Floats:
+    """The skin's vertices ``at (n, 3)``, moved towards ``still (n, 3)`` where triangles (t, 3) pass through each other.
+
+    still : the same vertices by a stiffer map. rest : (n, 3) on the head that the skin comes from. able : (n,) which of
+    the vertices that cross are asked about. Where more would cross afterwards than before, nothing moves.
+    """
+    size = float(np.ptp(rest, axis=0).max()) or 1.0
+    same = np.unique(np.round(rest / (SAME * size)), axis=0, return_inverse=True)[1].reshape(-1)
+    found = Crossings(at, triangles, same, np.zeros(len(triangles), np.int64), np.ones((1, 1), bool))
+    first = crossing(found, at, able)
+    crossed, out = np.zeros(len(at), bool), at
+    for _ in range(ROUNDS):
+        more = first if out is at else crossing(found, out, able)
+        if not len(more):
+            break
+        crossed[more] = True
+        far = cKDTree(rest[crossed]).query(rest, distance_upper_bound=BACK_MM[1])[0]
+        out = at + (1.0 - smoothstep(np.minimum(far, BACK_MM[1]), *BACK_MM))[:, None] * (still - at)
+    return out if len(crossing(found, out, able)) < len(first) else at
+
+
+def crossing(found: Crossings, at: Floats, able: Bools) -> Ints:
+    """The vertices (k,), of those that are ``able (n,)``, whose triangles pass through others at ``at (n, 3)``."""
+    pairs = found.pairs(at)
+    ids: Ints = np.unique(found.tree.triangles[pairs.ravel()])
+    return ids[able[ids]]

@@ -1,0 +1,43 @@
+"""Skin that passes through itself goes back to a stiffer map there, and nowhere else."""
+
+import numpy as np
+
+from surface.check.crossings import Crossings
+from surface.fit.transfer.detail.uncross import crossing, uncrossed
+
+X, Y = (a.ravel() for a in np.meshgrid(*2 * [np.linspace(-20.0, 20.0, 21)], indexing="ij"))
+K = np.arange(441).reshape(21, 21)
+A, B, C, D = (k.ravel() for k in (K[:-1, :-1], K[1:, :-1], K[1:, 1:], K[:-1, 1:]))
+ONE = np.vstack([np.column_stack([A, B, C]), np.column_stack([A, C, D])])
+TRIANGLES = np.vstack([ONE, ONE[:, ::-1] + 441])
+UPPER, LOWER = (np.column_stack([X, Y, np.full(441, z)]) for z in (2.0, 0.0))
+REST = np.vstack([UPPER, LOWER])
+ABLE = np.ones(len(REST), bool)
+
+
+def crossed(at: np.ndarray) -> int:
+    same = np.arange(len(REST))
+    return len(crossing(Crossings(at, TRIANGLES, same, 0 * TRIANGLES[:, 0], np.ones((1, 1), bool)), at, ABLE))
+
+
+def dented() -> np.ndarray:
+    """The upper sheet is pressed through the lower one near a corner."""
+    at = REST + 5.0 * np.eye(3)[0]
+    at[:441, 2] -= 4.0 * np.exp(-((X - 8.0) ** 2 + (Y - 8.0) ** 2) / 20.0)
+    return at
+
+
+def test_skin_that_crosses_goes_back_and_the_rest_stays() -> None:
+    at, still = dented(), REST + 5.5 * np.eye(3)[0]
+    assert crossed(at) > 10
+    made = uncrossed(at, still, REST, TRIANGLES, ABLE)
+    assert crossed(made) == 0
+    far = np.hypot(X - 8.0, Y - 8.0) > 15.0
+    np.testing.assert_array_equal(made[:441][far], at[:441][far])
+
+
+def test_only_skin_that_is_asked_about_goes_back_and_none_where_the_stiffer_map_is_no_better() -> None:
+    at = dented()
+    assert uncrossed(at, REST, REST, TRIANGLES, ~ABLE) is at
+    assert uncrossed(at, at.copy(), REST, TRIANGLES, ABLE) is at
+    assert uncrossed(REST, at, REST, TRIANGLES, ABLE) is REST
