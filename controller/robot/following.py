@@ -96,7 +96,8 @@ class Mirror:
         real = np.diff(self._at, axis=1) > 0.0
         self.readable = np.array([_is_monotonic(row[keep]) for row, keep in zip(steps, real, strict=True)])
         self._rest = self._last = parameters.neutral()
-        faces = np.zeros((0, len(parameters))) if faces is None else faces
+        faces = np.zeros((0, len(parameters))) if faces is None else faces * table.reached  # what servos can show
+        faces = faces[np.abs(faces).sum(axis=1) > 0.0]
         self._likely = LikelyFace(
             table.mixed, table.linear, faces, rest=self._rest, bounds=self._bounds, ends=self._ends
         )

@@ -17,11 +17,11 @@ from controller.base.parameters import Flags, Floats
 from controller.base.solve import BoundedSolver
 
 _RIDGE, _SPARSITY, _TOLERANCE = 1e-3, 1e-2, 1e-5
-_EXPRESSION = 3.0  # a whole expression costs as much as so many parameters at 1: more would leave out expressions that
-# are shown, less would see them in faces that nobody named (measured on a recorded performance)
+_EXPRESSION = 0.35  # an expression costs this share of what its parameters cost one by one: more would leave out what
+# is shown, less would see expressions in faces that have none (measured on a recorded performance)
 _BEYOND = 30.0  # a mix beyond the end of its curve costs this much less than a parameter of that size
 MAX_BEYOND = 1.0
-"""How far a mix may be guessed to lie beyond the end of its curve."""
+"""How far a mix may be guessed to lie beyond the end of its curve, in halves of the curve's range."""
 
 
 class LikelyFace:
@@ -38,13 +38,17 @@ class LikelyFace:
     ) -> None:  # fmt: skip
         self._bounds, self._ends, self._rest = bounds, ends, rest
         (k, p), n = faces.shape, len(linear)
-        self._faces = faces / _EXPRESSION
+        cost = _EXPRESSION * np.maximum(np.abs(faces).sum(axis=1), 1e-9)
+        self._faces = faces / cost[:, None]
         self._zero = np.nan_to_num(mixed(rest))
-        known = [np.nan_to_num(mixed(np.clip(rest + face, *bounds))) - self._zero for face in faces]
+        self._scale = 2.0 / np.maximum(ends[1] - ends[0], 1e-9)  # units differ: mm of pull, shares of a range
+        known = [self._scale * (np.nan_to_num(mixed(np.clip(rest + face, *bounds))) - self._zero) for face in faces]
         # a column for each expression, each parameter, and how far each mix lies beyond the end of its curve
-        self._columns = np.hstack([np.reshape(known, (k, n)).T / _EXPRESSION, linear, -_BEYOND * np.eye(n)])
+        self._columns = np.hstack(
+            [np.reshape(known, (k, n)).T / cost, linear * self._scale[:, None], -_BEYOND * np.eye(n)]
+        )
         self._low = np.concatenate([np.zeros(k), bounds[0] - rest, np.zeros(n)])
-        self._high = np.concatenate([np.full(k, _EXPRESSION), bounds[1] - rest, np.zeros(n)])
+        self._high = np.concatenate([cost, bounds[1] - rest, np.zeros(n)])
         self._last = np.zeros(k + p + n)
         self._solver = lru_cache(64)(self._make_solver)  # most cycles use the same channels
         self._solver(np.ones(n, bool).tobytes())  # compiles the solver here, so that no cycle of a bus waits for it
@@ -58,7 +62,7 @@ class LikelyFace:
         low, high = self._low.copy(), self._high.copy()
         low[k + p :] = np.where(counted & (mixes <= self._ends[0]), -MAX_BEYOND / _BEYOND, 0.0)
         high[k + p :] = np.where(counted & (mixes >= self._ends[1]), MAX_BEYOND / _BEYOND, 0.0)
-        wanted = np.where(counted, mixes - self._zero, 0.0)
+        wanted = np.where(counted, self._scale * (mixes - self._zero), 0.0)
         self._last = self._solver(counted.tobytes()).solve(wanted, start=self._last, bounds=(low, high))
         found = self._rest + self._last[:k] @ self._faces + self._last[k : k + p]
         return np.clip(found, *self._bounds)
