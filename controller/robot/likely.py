@@ -65,7 +65,8 @@ class LikelyFace:
         wanted = np.where(counted, self._scale * (mixes - self._zero), 0.0)
         self._last = self._solver(counted.tobytes()).solve(wanted, start=self._last, bounds=(low, high))
         found = self._rest + self._last[:k] @ self._faces + self._last[k : k + p]
-        return np.clip(found, *self._bounds)
+        clipped: Floats = np.clip(found, *self._bounds)
+        return clipped
 
     def _make_solver(self, counted: bytes) -> BoundedSolver:
         """Create the solver for the channels that are counted: their flags as bytes."""

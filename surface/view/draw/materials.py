@@ -38,6 +38,8 @@ _GROOVE_MM, _GROOVE = 2.2, 0.5
 _IRIS, _PUPIL = 0.49, 0.185 / 0.49
 #: How a bar of lamps fades, as brows do in hair.frag.
 _BAR = (2.2, -2.6, 0.08, 0.0)
+#: How far from its roots hair counts that does not hang from a parting, mm.
+_NO_ROOTS_MM = 1e3
 #: Materials of parts that the skin surrounds in every pose.
 INSIDE = ("eye", "teeth", "gums", "mouth")
 #: Programs of what is worn.
@@ -306,15 +308,20 @@ def _worn_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
     }
     if material_of(part.material).program == "strand":
         static["along"] = attribute(part, "along", (0.0, -1.0, 0.0))
+        static["roots"] = attribute(part, "roots", (_NO_ROOTS_MM,))[:, :1]
     return static
 
 
 def _worn(program: str, order: int, *, two_sided: bool = False) -> Material:
     """Hair or cloth, drawn before the skin, which it hides; of hair all over the skull only the near side is drawn."""
     covering = program == "strand"
-    return Material(
-        program, _worn_static, lambda part, theme, openings: {}, two_sided=two_sided, covering=covering, order=order
-    )
+    return Material(program, _worn_static, _worn_uniforms, two_sided=two_sided, covering=covering, order=order)
+
+
+def _worn_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> dict[str, Any]:
+    """How much brighter than hair the skin at a parting is."""
+    scalp = part.attributes.get("scalp")
+    return {"scalp": (1.0, 1.0, 1.0) if scalp is None else tuple(map(float, scalp[0]))}
 
 
 MATERIALS: dict[str, Material] = {

@@ -16,7 +16,7 @@ _LOW = 0.55  # share of a crown's height, from its tip, above which a border is 
 _SAME_MM = 1e-3  # vertices that are closer are one
 
 
-def tooth_necks(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) -> NDArray[np.float32]:
+def tooth_necks(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) -> NDArray[np.float32]:
     """Return (m,) float32: how much gum covers each vertex (m, 3), mm, of teeth; 0 all over teeth without a border."""
     from scipy.sparse import coo_matrix  # imported lazily: only teeth need it
     from scipy.sparse.csgraph import connected_components  # imported lazily: only teeth need it
@@ -33,7 +33,8 @@ def tooth_necks(vertices: NDArray[np.floating], triangles: NDArray[np.integer]) 
     tooth = connected_components(graph, directed=False)[1]
     border = np.zeros(len(places), bool)
     border[edges.ravel()] = True
-    at, out = places * _SAME_MM, np.zeros(len(places))
+    at = np.asarray(places * _SAME_MM, np.float64)
+    out = np.zeros(len(places))
     for k in np.unique(tooth[border]):
         own = np.flatnonzero(tooth == k)
         out[own] = _covered(at[own], border[own])
