@@ -158,17 +158,19 @@ class BoundedSolver:
         self.rounds = 0
         self.solve(np.zeros(m))  # compiles, which may take seconds, before a bus waits for an answer
 
-    def solve(self, wanted: Floats, start: Floats | None = None) -> Floats:
+    def solve(self, wanted: Floats, start: Floats | None = None, bounds: tuple[Floats, Floats] | None = None) -> Floats:
         """Return the best (n,) values for ``wanted`` : (m,).
 
-        ``start`` : (n,) initial values, as the last solution when following a motion. Default: zero.
+        ``start`` : (n,) initial values, as the last solution when following a motion. Default: zero. ``bounds`` : (n,)
+        lower and (n,) upper bounds for this problem alone. Default: those of the solver.
 
         Raises ValueError: ``wanted`` is not finite.
         """
         if not np.isfinite(wanted).all():
             raise ValueError("wanted must be finite")
-        x = np.zeros(len(self._low)) if start is None else np.array(start, dtype=np.float64)
-        np.clip(x, self._low, self._high, out=x)
+        low, high = (self._low, self._high) if bounds is None else bounds
+        x = np.zeros(len(low)) if start is None else np.array(start, dtype=np.float64)
+        np.clip(x, low, high, out=x)
         right = wanted @ self._weighted
-        self.rounds = int(_descend(self._gram, right, self._low, self._high, self._sparsity, self._tolerance, x))
+        self.rounds = int(_descend(self._gram, right, low, high, self._sparsity, self._tolerance, x))
         return x

@@ -96,6 +96,7 @@ class Body:
                 [bus.measured for bus in self.buses],
                 parameters,
                 [bus.following for bus in self.buses],
+                stage.vocabulary.faces(),
             )
         self.state.servo_monitor = self.measured_face
         self.state.servo_records = lambda: [record for bus in self.buses for record in servo_states(bus)]

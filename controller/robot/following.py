@@ -5,7 +5,6 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +13,12 @@ from controller.base.parameters import Flags, Floats, Parameters
 from controller.base.solve import BoundedSolver
 from controller.layers.commands import CommandState, StatusValue
 from controller.robot.channels import ChannelTable
+from controller.robot.likely import LikelyFace
 from drivers.base.bus import BusState
 
-_SOLVER_OPTIONS: dict[str, Any] = {"ridge": 1e-4, "sparsity": 1e-3, "tolerance": 1e-5}
+_RIDGE, _TOLERANCE = 1e-4, 1e-5
 _MAX_STEPS = 8
+_CLOSE = 1e-3  # rms, as a fraction of each channel's range, below which a face fits
 _MAX_ERROR = 0.01  # rms, as a fraction of each channel's range
 
 
@@ -75,25 +76,32 @@ class FollowingStatistics:
 class Mirror:
     """Finds parameters for which the channels have the measured angles.
 
-    A servo head has fewer degrees of freedom than a face, so many faces have the same angles; a face with few and small
-    parameters is chosen. Eyes give the parameters of eye angles, never the eyeLook shapes.
+    A servo head has fewer degrees of freedom than a face, so many faces have the same angles. The likely one is chosen,
+    made of few known expressions and few parameters (:class:`controller.robot.likely.LikelyFace`), and corrected until
+    it has the angles. Eyes give the parameters of eye angles, never the eyeLook shapes.
 
+    faces : (k, P) what each known expression adds to the neutral face. Default: none.
     readable : (n,) bool, the channels that can be inverted: those whose map is strictly monotonic.
     """
 
-    def __init__(self, table: ChannelTable, parameters: Parameters) -> None:
+    def __init__(self, table: ChannelTable, parameters: Parameters, faces: Floats | None = None) -> None:
         self._table = table
         high = parameters.high.copy()
         high[[i for i, name in enumerate(parameters.names) if name.startswith("eyeLook")]] = 0.0
         self._bounds = parameters.low, high
         self._at, self._rad = _points(table)
+        self._ends = self._at[:, 0], self._at[:, -1]
+        self._span = np.maximum(self._ends[1] - self._ends[0], 1e-9)
         steps = np.diff(self._rad, axis=1)
         real = np.diff(self._at, axis=1) > 0.0
         self.readable = np.array([_is_monotonic(row[keep]) for row, keep in zip(steps, real, strict=True)])
-        self._solver = lru_cache(64)(self._make_solver)  # most cycles use the same channels
         self._rest = self._last = parameters.neutral()
-        self._span = np.maximum(self._at[:, -1] - self._at[:, 0], 1e-9)
-        self._solver(self.readable.tobytes())  # compiles the solver here, so that no cycle of a bus has to wait for it
+        faces = np.zeros((0, len(parameters))) if faces is None else faces * table.reached  # what servos can show
+        faces = faces[np.abs(faces).sum(axis=1) > 0.0]
+        self._likely = LikelyFace(
+            table.mixed, table.linear, faces, rest=self._rest, bounds=self._bounds, ends=self._ends
+        )
+        self._step = lru_cache(64)(self._make_step)  # most cycles use the same channels
 
     def read(self, angles_rad: Floats, fresh: Flags | None = None) -> Floats:
         """Return the parameters (P,) that fit ``angles_rad`` : (n,) best; angles not ``fresh`` : (n,) are ignored."""
@@ -101,27 +109,24 @@ class Mirror:
         if fresh is not None:
             counted &= fresh
         wanted = np.where(counted, self._mixes(angles_rad), 0.0)
-        if not self._table.bound:
-            self._last = self._solver(counted.tobytes()).solve(wanted, start=self._last)
-            return self._last.copy()
-        found = self._approach(self._last, wanted, counted)
-        if self._fit_error(found, wanted, counted) > _MAX_ERROR:  # another branch of a condition or linkage may fit
-            straight = self._solver(counted.tobytes()).solve(wanted)
-            others = [self._approach(start, wanted, counted) for start in (straight, self._rest)]
+        found = self._approach(self._likely.find(wanted, counted), wanted, counted)
+        if self._table.bound and self._fit_error(found, wanted, counted) > _MAX_ERROR:
+            # another branch of a condition or linkage may fit
+            others = [self._approach(start, wanted, counted) for start in (self._last, self._rest)]
             found = min((found, *others), key=lambda each: self._fit_error(each, wanted, counted))
         self._last = found
         return found.copy()
 
     def _approach(self, start: Floats, wanted: Floats, counted: Flags) -> Floats:
-        """Improve parameters (P,) from ``start`` until their mixes fit, by bounded Gauss-Newton steps.
+        """Move parameters (P,) from ``start`` as little as needed until their mixes fit, by bounded Gauss-Newton steps.
 
         A step that does not improve the fit is shortened.
         """
         at, error = start, self._fit_error(start, wanted, counted)
         for _ in range(_MAX_STEPS):
-            slopes = self._table.slopes(at)
-            solver = BoundedSolver(slopes, *self._bounds, weights=counted.astype(np.float64), **_SOLVER_OPTIONS)
-            goal = solver.solve(np.where(counted, wanted - self._model(at) + slopes @ at, 0.0), start=at)
+            if error < _CLOSE:
+                return at
+            goal = np.clip(at + self._way(at, wanted, counted), *self._bounds)
             for fraction in (1.0, 0.5, 0.25, 0.1):
                 candidate = at + fraction * (goal - at)
                 if (new_error := self._fit_error(candidate, wanted, counted)) < error:
@@ -133,16 +138,24 @@ class Mirror:
                 return at
         return at
 
-    def _model(self, values: Floats) -> Floats:
-        """(n,) mixes: exact for formulas and linkages, by the table's ``linear`` for weights, curves and anchors."""
-        mixed = self._table.linear @ values
-        for bound in self._table.bound:
-            mixed[bound.at] = bound(values)
-        return np.nan_to_num(mixed)
+    def _way(self, at: Floats, wanted: Floats, counted: Flags) -> Floats:
+        """(P,) the smallest change of parameters from ``at`` that makes up for what the mixes lack."""
+        lacking = self._lacking(at, wanted, counted)
+        if not self._table.bound:
+            return self._step(counted.tobytes()) @ lacking
+        weights = counted.astype(np.float64)
+        low, high = self._bounds
+        return BoundedSolver(self._table.slopes(at), low - at, high - at, weights=weights, ridge=_RIDGE,
+                             tolerance=_TOLERANCE).solve(lacking)  # fmt: skip
+
+    def _lacking(self, values: Floats, wanted: Floats, counted: Flags) -> Floats:
+        """(n,) wanted mixes less those of parameters (P,), which show at most the ends of their curves."""
+        shown = np.clip(np.nan_to_num(self._table.mixed(values)), *self._ends)
+        return np.where(counted, wanted - shown, 0.0)
 
     def _fit_error(self, values: Floats, wanted: Floats, counted: Flags) -> float:
         """Difference of the mixes from the wanted ones, rms over channels, as a fraction of each channel's range."""
-        difference = np.where(counted, (self._model(values) - wanted) / self._span, 0.0)
+        difference = self._lacking(values, wanted, counted) / self._span
         return float(np.sqrt((difference**2).sum() / max(int(counted.sum()), 1)))
 
     def _mixes(self, angles_rad: Floats) -> Floats:
@@ -154,14 +167,11 @@ class Mirror:
                 mixes[i] = np.interp(angle, rad, at) if rad[-1] > rad[0] else np.interp(-angle, -rad, at)
         return mixes
 
-    def _make_solver(self, counted: bytes) -> BoundedSolver:
-        """Create the solver for the channels that are counted: their flags as bytes."""
-        return BoundedSolver(
-            self._table.linear,
-            *self._bounds,
-            weights=np.frombuffer(counted, bool).astype(np.float64),
-            **_SOLVER_OPTIONS,
-        )
+    def _make_step(self, counted: bytes) -> Floats:
+        """(P, n) smallest change of parameters per unit of each mix; ``counted`` : flags of the channels, as bytes."""
+        slopes = self._table.linear * np.frombuffer(counted, bool)[:, None]
+        step: Floats = slopes.T @ np.linalg.inv(slopes @ slopes.T + _RIDGE * np.eye(len(slopes)))
+        return step
 
 
 def _points(table: ChannelTable) -> tuple[Floats, Floats]:
@@ -182,6 +192,7 @@ class MeasuredFace:
 
     tables : the channels of each bus. measured : returns the newest measurement of each, None before the first.
     following : the statistics of each bus, for :meth:`differences` and :meth:`status`.
+    faces : (k, P) what each known expression adds to the neutral face, for :class:`Mirror`.
     """
 
     def __init__(
@@ -190,8 +201,9 @@ class MeasuredFace:
         measured: Sequence[Callable[[], BusState | None]],
         parameters: Parameters,
         following: Sequence[FollowingStatistics] = (),
+        faces: Floats | None = None,
     ) -> None:
-        self._mirrors = [(Mirror(table, parameters), read) for table, read in zip(tables, measured, strict=True)]
+        self._mirrors = [(Mirror(table, parameters, faces), read) for table, read in zip(tables, measured, strict=True)]
         self._touched = [table.reached for table in tables]
         self._following, self._region_names = following, parameters.region_names
         self._rest = parameters.neutral()

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from controller.base.errors import ParameterError
-from controller.base.parameters import Parameters, did_you_mean, fold
+from controller.base.parameters import Floats, Parameters, did_you_mean, fold
 from controller.base.paths import config_dir
 from controller.base.plain_numbers import plain_number
 from controller.vocabulary.affect import Affect
@@ -50,6 +50,11 @@ class Vocabulary:
     def names(self) -> tuple[str, ...]:
         """Canonical names, in file order."""
         return tuple(self._expressions)
+
+    def faces(self) -> Floats:
+        """(k, P) what each named expression adds to the neutral face at intensity 1, without those that add nothing."""
+        weights = [each.weights for each in self._expressions.values() if each.weights.any()]
+        return np.reshape(weights, (-1, len(self._parameters)))
 
     def add(self, expression: Expression) -> None:
         """Add an expression, or replace the one with its name; the next lookup finds it.

@@ -18,6 +18,7 @@ from surface.head.posing.part import HeadPart, Turn
 
 COVERED = 0.5  # of the picture of hidden skin: more is not drawn
 SCALP = 0.6  # of hair's colour on the skin between its roots, where little light reaches
+ALONG_MM = 900.0  # of strands for a tile of their texture along them, as surface.fit.wardrobe makes them
 THROUGH = 0.8  # of the skin between roots of hair that is light, which lets light through and shows less on it
 
 
@@ -33,6 +34,8 @@ def dress(parts: Iterable[HeadPart], garments: Sequence[Garment]) -> None:
                 why = f"{worn.name}/strands belongs to another mesh"
                 raise HeadFileError(f"{garment.worn.path}: is damaged: {why}", hint=HINT)
             _colour(of[worn.name], worn, garment.worn)
+            if of[worn.name].material == "tress":
+                _show_parting(of[worn.name], garment, of.values())
     for part in of.values():
         if part.material == "skin":
             _colour_below(part, garments)
@@ -50,6 +53,25 @@ def _colour(part: HeadPart, worn: WornPart, look: Worn) -> None:
     part.attributes["along"] = _directions(part)
     fast = np.asarray(a["fast"], np.int32)
     part.decimated = {"fast": fast, "full": fast}  # stills have all
+
+
+def _show_parting(part: HeadPart, garment: Garment, others: Iterable[HeadPart]) -> None:
+    """Give hair that hangs from a parting ``roots``, (m, 1) mm from the roots along the strands, and ``scalp``, (m, 3)
+    how much brighter than the hair's roots the skin is that shows there."""
+    along, patch = part.attributes["strands"][:, 1], np.floor(np.asarray(part.uv)[:, 0] / 2.0).astype(int)
+    first = np.full(patch.max(initial=0) + 1, np.inf)
+    np.minimum.at(first, patch, along)
+    part.attributes["roots"] = np.asarray(ALONG_MM * (along - first[patch])[:, None], np.float32)
+    skins = [
+        other.attributes["albedo"][cover[:, 0] > COVERED]
+        for other in others
+        if other.material == "skin" and "albedo" in other.attributes
+        if (cover := sample_picture(garment, "cover", other)) is not None
+    ]
+    under = np.concatenate([np.zeros((0, 3), np.float32), *skins])
+    if len(under):
+        ratio = under.mean(axis=0) / np.maximum(garment.worn.colour, 1e-3)
+        part.attributes["scalp"] = np.tile(ratio.astype(np.float32), (len(along), 1))
 
 
 def _directions(part: HeadPart) -> Floats32:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surface.view.draw.programs import build
+from surface.view.draw.tooth_necks import tooth_necks
 from surface.view.scene.openings import LID_POINTS, Openings
 from surface.view.scene.parts import ViewPart
 from surface.view.scene.theme import Theme
@@ -37,6 +38,8 @@ _GROOVE_MM, _GROOVE = 2.2, 0.5
 _IRIS, _PUPIL = 0.49, 0.185 / 0.49
 #: How a bar of lamps fades, as brows do in hair.frag.
 _BAR = (2.2, -2.6, 0.08, 0.0)
+#: How far from its roots hair counts that does not hang from a parting, mm.
+_NO_ROOTS_MM = 1e3
 #: Materials of parts that the skin surrounds in every pose.
 INSIDE = ("eye", "teeth", "gums", "mouth")
 #: Programs of what is worn.
@@ -211,14 +214,15 @@ def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[s
 
 
 def _inner(
-    albedo: tuple[float, float, float], wrap: float, wetness: float, *, grooved: bool = False, **options: Any
-) -> Material:
-    """A material inside the mouth."""
+    albedo: tuple[float, float, float], wrap: float, wetness: float,
+    shade: Callable[[ViewPart], np.ndarray] | None = None, **options: Any,
+) -> Material:  # fmt: skip
+    """A material inside the mouth; ``shade`` gives (m, 2): occlusion, and how much gum covers a tooth."""
 
     fixed = {"albedo": albedo, "wrap": (wrap, 0.6 * wrap, 0.6 * wrap), "wetness": wetness}
     return Material(
         "inner",
-        lambda part, theme, openings: {"occlusion": _grooved(part) if grooved else _occlusion(part)},
+        lambda part, theme, openings: {"shade": (shade or _bare)(part)},
         lambda part, theme, openings: fixed | _lamps(theme) | openings.mouth(),
         **options,
     )
@@ -228,12 +232,24 @@ def _occlusion(part: ViewPart) -> np.ndarray:
     return attribute(part, "occlusion", (1.0,))[:, :1]
 
 
+def _bare(part: ViewPart) -> np.ndarray:
+    """(m, 2): occlusion, and no gum."""
+    return np.hstack([_occlusion(part), np.zeros((len(part.vertices), 1), np.float32)])
+
+
+def _necked(part: ViewPart) -> np.ndarray:
+    """(m, 2): occlusion, and the gum that covers teeth."""
+    necks = tooth_necks(np.asarray(part.vertices, np.float64), part.triangles)
+    return np.hstack([_occlusion(part), necks[:, None]])
+
+
 def _grooved(part: ViewPart) -> np.ndarray:
-    """Occlusion (m, 1) of a tongue, with a furrow along the middle of its upper side."""
+    """(m, 2): occlusion of a tongue, with a furrow along the middle of its upper side, and no gum."""
     across = np.asarray(part.vertices[:, 0]) - np.median(part.vertices[:, 0])
     furrow = np.exp(-((across / _GROOVE_MM) ** 2)) * np.clip(part.normals[:, 1], 0.0, 1.0)
-    grooved: np.ndarray = (_occlusion(part) * (1.0 - _GROOVE * furrow[:, None])).astype(np.float32)
-    return grooved
+    shade = _bare(part)
+    shade[:, 0] *= 1.0 - _GROOVE * furrow
+    return shade
 
 
 def _hair(colour: str, fade: tuple[float, float, float, float], edges: float = 0.0) -> Material:
@@ -292,15 +308,20 @@ def _worn_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
     }
     if material_of(part.material).program == "strand":
         static["along"] = attribute(part, "along", (0.0, -1.0, 0.0))
+        static["roots"] = attribute(part, "roots", (_NO_ROOTS_MM,))[:, :1]
     return static
 
 
 def _worn(program: str, order: int, *, two_sided: bool = False) -> Material:
     """Hair or cloth, drawn before the skin, which it hides; of hair all over the skull only the near side is drawn."""
     covering = program == "strand"
-    return Material(
-        program, _worn_static, lambda part, theme, openings: {}, two_sided=two_sided, covering=covering, order=order
-    )
+    return Material(program, _worn_static, _worn_uniforms, two_sided=two_sided, covering=covering, order=order)
+
+
+def _worn_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> dict[str, Any]:
+    """How much brighter than hair the skin at a parting is."""
+    scalp = part.attributes.get("scalp")
+    return {"scalp": (1.0, 1.0, 1.0) if scalp is None else tuple(map(float, scalp[0]))}
 
 
 MATERIALS: dict[str, Material] = {
@@ -311,8 +332,8 @@ MATERIALS: dict[str, Material] = {
     "eye": Material("eye", lambda part, theme, openings: {"local": openings.local(part)}, _eye_uniforms, order=1),
     "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),
     "brow": _hair("brow", (0.70, 0.46, 0.36, 1.7), 1.0),
-    "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, order=3),
-    "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.42, grooved=True, order=4),
+    "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, _necked, order=3),
+    "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.42, _grooved, order=4),
     "gums": _inner((0.48, 0.15, 0.14), 0.3, 0.20, order=5),
     "mouth": _inner((0.46, 0.16, 0.15), 0.3, 0.20, two_sided=True, order=6),
 }

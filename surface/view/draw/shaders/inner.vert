@@ -1,5 +1,6 @@
 // Teeth, gums, tongue and the mouth's lining: lit by what comes in between the lips, per vertex.
 #define WALLS vec3(0.50, 0.18, 0.16)
+#define GUM vec3(0.48, 0.15, 0.14)
 #define NEIGHBOURS vec3(0.84, 0.82, 0.80)
 #define DEEP_MM vec2(12.0, 40.0)  // behind the lips: where the mouth's inside begins to be deep, and where it is
 #define ARCH_MM 45.0              // how far behind the lips the middle of the row of teeth lies
@@ -16,7 +17,7 @@ uniform float wetness;
 
 in vec3 position;
 in vec3 normal;
-in float occlusion;
+in vec2 shade;  // occlusion, and how much gum covers a tooth here
 
 out vec3 v_colour;
 
@@ -40,13 +41,14 @@ void main() {
     float past = dot(position - opening_centre, out_of);
     // Far in, light has been round the mouth's red walls and comes from everywhere.
     float deep = smoothstep(DEEP_MM.x, DEEP_MM.y, -past);
-    float teeth = smoothstep(0.5, 0.7, albedo.g);
+    float occlusion = shade.x;
+    float teeth = smoothstep(0.5, 0.7, albedo.g) * (1.0 - shade.y);
     // Towards the tongue gums reach far up the teeth, and nothing white is near.
     vec3 side = normalize(opening_side);
     vec3 away = position - opening_centre;
     vec3 outwards = normalize(dot(away, side) * side + (past + ARCH_MM) * out_of);
     float inwards = teeth * smoothstep(0.0, 0.5, -dot(n, outwards));
-    vec3 own = mix(albedo, WALLS, 0.45 * inwards);
+    vec3 own = mix(mix(albedo, GUM, shade.y), WALLS, 0.45 * inwards);
     n = normalize(mix(n, out_of, 0.55 * deep));
     vec3 tint = mix(vec3(1.0), ROUND_WALLS, max(deep, inwards));
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)

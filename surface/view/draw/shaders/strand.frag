@@ -1,10 +1,13 @@
 // Strands: locks part and thin out where their cover falls below a strand's height.
 #define SOFT vec2(0.9, 0.3)  // of strands' heights, over which each fades: few, as at a hairline, and many together
 #define STEADY 0.2  // a strand keeps its height along its length, so that no piece of it is left by itself
+#define PARTING vec3(0.1, 1.7, 2.4)  // mm from the roots: scalp, hair; how unevenly strands begin
+#define SCALP vec3(0.74, 0.66, 0.58)  // of skin between hair, which lights it warmly
 uniform sampler2D detail;
+uniform vec3 scalp;  // how much brighter than hair the skin at a parting is
 uniform bool multisampled;  // alpha then decides how many samples of a pixel a strand covers
 
-centroid in vec3 v_colour;  // at the edge of a triangle, the middle of a pixel may lie outside of it
+centroid in vec4 v_colour;  // and mm from the parting; at the edge of a triangle, the middle of a pixel may lie outside of it
 centroid in vec4 v_strand;
 #ifndef PER_VERTEX
 centroid in vec3 v_through;
@@ -34,11 +37,12 @@ void main() {
     if (cover <= 0.0) {
         discard;
     }
-    vec3 lit = v_colour * (0.45 + 1.1 * noise.y + 0.9 * (noise.w - 0.5));
+    vec3 lit = v_colour.rgb * (0.45 + 1.1 * noise.y + 0.9 * (noise.w - 0.5));
 #ifndef PER_VERTEX
     float sine = v_strand.w + 0.30 * (noise.z - 0.5);
     lit += v_through * shine(sine, THROUGH) * (0.4 + 1.2 * noise.x);
     lit += key_colour * (v_surface * shine(sine, SURFACE) * (0.2 + 1.6 * noise.y));
 #endif
-    colour = vec4(encode(lit), cover);
+    float bare = 1.0 - smoothstep(PARTING.x, PARTING.y, v_colour.a + PARTING.z * (noise.w - 0.5));
+    colour = vec4(encode(mix(lit, SCALP * scalp * v_colour.rgb, bare)), cover);
 }

@@ -10,8 +10,9 @@ in vec3 normal;
 in vec4 albedo_gloss;         // square root of the linear albedo, gloss
 in vec4 strands;              // texture coordinates across and along, cover, how open it lies
 in vec3 along;                // direction of the strands at rest
+in float roots;               // mm from the parting
 
-centroid out vec3 v_colour;
+centroid out vec4 v_colour;            // and mm from the parting
 centroid out vec4 v_strand;            // texture coordinates, cover, sine of the angle half way
 #ifndef PER_VERTEX
 centroid out vec3 v_through;  // colour of the highlight that went through the fibre
@@ -37,6 +38,6 @@ void main() {
     v_through = through;
     v_surface = surface;
 #endif
-    v_colour = colour;
+    v_colour = vec4(colour, roots);
     v_strand = vec4(strands.xyz, sine);
 }

@@ -14,7 +14,7 @@ from surface.base.errors import HeadFileError
 from surface.head import Head
 from surface.head.model.data import Neck
 from surface.head.model.parameters import rotation
-from surface.head.posing.dressing import SCALP, THROUGH, WornMesh, dress, sample_picture
+from surface.head.posing.dressing import ALONG_MM, SCALP, THROUGH, WornMesh, dress, sample_picture
 
 
 @pytest.fixture
@@ -59,6 +59,24 @@ def test_hair_without_tips_has_one_colour_and_bright_hair_stays_in_range(head: H
     dress(head.parts, [worn])
     wanted = [min(0.8 * 255 / 128, 1.0), 0.0, 0.0]
     np.testing.assert_allclose(head.part("b").attributes["albedo"], [wanted] * len(head.part("b").vertices), atol=1e-6)
+
+
+def test_hair_that_hangs_knows_how_far_its_roots_are_and_what_skin_shows_there(head: Head) -> None:
+    part, skin = head.part("b"), head.part("a")
+    part.material, skin.material = "tress", "skin"
+    skin.attributes["albedo"] = np.full((len(skin.vertices), 3), 0.4, np.float32)
+    worn = garment(head, {"cover/a": np.ones((2, 2), np.float32)})
+    dress(head.parts, [worn])
+    along = worn.parts[0].arrays["strands"][:, 1]
+    for patch in np.unique(np.floor(part.uv[:, 0] / 2.0)):
+        own = np.floor(part.uv[:, 0] / 2.0) == patch
+        assert part.attributes["roots"][own, 0] == pytest.approx(ALONG_MM * (along[own] - along[own].min()))
+    assert part.attributes["scalp"][0] == pytest.approx([0.4 / 0.8, 400.0, 400.0])
+
+
+def test_hair_that_does_not_hang_has_no_parting(head: Head) -> None:
+    dress(head.parts, [garment(head)])
+    assert not {"roots", "scalp"} & set(head.part("b").attributes)
 
 
 def test_colours_of_another_mesh_are_refused(head: Head) -> None:

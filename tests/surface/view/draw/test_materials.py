@@ -224,9 +224,9 @@ def test_what_is_inside_the_mouth_is_reddish_and_teeth_are_nearly_white() -> Non
     }  # fmt: skip
     for one in given.values():
         assert one["wrap"][1:] == pytest.approx([0.6 * one["wrap"][0]] * 2)
-    bare = material_of("teeth").static(part, THEMES["skin"], seen)["occlusion"]
-    assert bare.shape == (len(part.vertices), 1) and (bare == 1.0).all()
-    furrow = material_of("tongue").static(part, THEMES["skin"], seen)["occlusion"][:, 0]
+    bare = material_of("teeth").static(part, THEMES["skin"], seen)["shade"]
+    assert bare.shape == (len(part.vertices), 2) and (bare[:, 0] == 1.0).all()
+    furrow = material_of("tongue").static(part, THEMES["skin"], seen)["shade"][:, 0]
     upper = part.normals[:, 1] > 0.5
     middle = np.abs(part.vertices[:, 0] - np.median(part.vertices[:, 0])) < 1.0
     assert (furrow[~upper & (part.normals[:, 1] <= 0.0)] == 1.0).all()
