@@ -48,7 +48,7 @@ class Neck:
 
 NECKS = {
     "clothes-crew": Neck(-126.0, -100.0, -86.0, 2.5, 7.0, 1.0),
-    "clothes-turtleneck": Neck(-108.0, -94.0, -80.0, 3.5, 34.0, 2.0),
+    "clothes-turtleneck": Neck(-110.0, -96.0, -81.0, 3.5, 25.0, 2.0),
     "clothes-shirt": Neck(-122.0, -98.0, -84.0, 4.0, 22.0, 5.0, fold=True),
 }
 
@@ -107,7 +107,7 @@ def _collar(skin: Skin, ring: Floats, neck: Neck) -> list[Floats]:
     if neck.stand > 12.0:  # the neck is narrower there
         normals, height = skin.nearest(rim)
         rim = _smooth(rim + (neck.off + 0.5 * neck.lean - height)[:, None] * unit(normals * (1.0, 0.3, 1.0)))
-    inside, lip = rim - 1.6 * level - 9.0 * up, rim - 0.8 * level
+    inside, lip = rim - 1.6 * level - 9.0 * unit(rim - line), rim - 0.8 * level  # along the collar, which leans
     return [inside, lip, rim + 1.0 * up, rim + 1.2 * level - 1.0 * up, 0.5 * (rim + line) + 0.8 * level]
 
 
