@@ -7,8 +7,13 @@ uniform sampler2D detail;
 uniform vec3 scalp;  // how much brighter than hair the skin at a parting is
 uniform bool multisampled;  // alpha then decides how many samples of a pixel a strand covers
 
-centroid in vec4 v_colour;  // and mm from the parting; at the edge of a triangle, the middle of a pixel may lie outside of it
+#ifdef PER_VERTEX
+centroid in vec3 v_colour;  // at the edge of a triangle, the middle of a pixel may lie outside of it
+centroid in vec4 v_strand;  // with mm from the parting last
+#else
+centroid in vec4 v_colour;  // with mm from the parting last
 centroid in vec4 v_strand;
+#endif
 #ifndef PER_VERTEX
 centroid in vec3 v_through;
 centroid in float v_surface;
@@ -43,6 +48,14 @@ void main() {
     lit += v_through * shine(sine, THROUGH) * (0.4 + 1.2 * noise.x);
     lit += key_colour * (v_surface * shine(sine, SURFACE) * (0.2 + 1.6 * noise.y));
 #endif
-    float bare = 1.0 - smoothstep(PARTING.x, PARTING.y, v_colour.a + PARTING.z * (noise.w - 0.5));
-    colour = vec4(encode(mix(lit, SCALP * scalp * v_colour.rgb, bare)), cover);
+#ifdef PER_VERTEX
+    float roots = v_strand.w;
+#else
+    float roots = v_colour.a;
+#endif
+    if (roots < 4.0) {  // few pixels
+        float bare = 1.0 - smoothstep(PARTING.x, PARTING.y, roots + PARTING.z * (noise.w - 0.5));
+        lit = mix(lit, SCALP * scalp * v_colour.rgb, bare);
+    }
+    colour = vec4(encode(lit), cover);
 }

@@ -12,8 +12,12 @@ in vec4 strands;              // texture coordinates across and along, cover, ho
 in vec3 along;                // direction of the strands at rest
 in float roots;               // mm from the parting
 
+#ifdef PER_VERTEX
+centroid out vec3 v_colour;
+#else
 centroid out vec4 v_colour;            // and mm from the parting
-centroid out vec4 v_strand;            // texture coordinates, cover, sine of the angle half way
+#endif
+centroid out vec4 v_strand;            // texture coordinates, cover; sine of the angle half way, with PER_VERTEX mm from the parting
 #ifndef PER_VERTEX
 centroid out vec3 v_through;  // colour of the highlight that went through the fibre
 centroid out float v_surface; // strength of the other
@@ -38,6 +42,11 @@ void main() {
     v_through = through;
     v_surface = surface;
 #endif
+#ifdef PER_VERTEX
+    v_colour = colour;
+    v_strand = vec4(strands.xyz, roots);
+#else
     v_colour = vec4(colour, roots);
     v_strand = vec4(strands.xyz, sine);
+#endif
 }
