@@ -31,7 +31,6 @@ FLAT = 0.5  # least cosine between a sample's normal and the direction of its pl
 SMOOTH = 8.0  # weight of smoothness, relative to that of the goals
 LESS = 0.85  # of a place's RMS distance, that may be left at most, for the skin to stay where it was brought
 NEAREST = 4  # samples that give the height of the scan at a vertex
-VOTES = 3  # rounds in which a vertex that lies on the scan by chance, among others that do not, is found
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,7 @@ def cover(sheet: Sheet, at: Floats, off: Bools, points: Floats, normals: Floats)
     off : (n,) which vertices do not lie on the scan; the others stay. normals : (m, 3) unit normals of the samples.
     Where the skin comes no nearer to a place, it stays as it was.
     """
-    off = _voted(off, sheet.step) & sheet.free
+    off = _with_ring(off, sheet.step) & sheet.free
     spanned = np.zeros(len(at), bool)
     for _ in range(ROUNDS):
         before = at
@@ -99,11 +98,9 @@ def bare_places(at: Floats, triangles: Ints, points: Floats, normals: Floats) ->
     return [Bare(points[near[place == k]], normals[near[place == k]]) for k in chosen[np.argsort(-worst[chosen])]]
 
 
-def _voted(off: Bools, step: csr_matrix) -> Bools:
-    """``off (n,)``, vertices most of whose neighbours are off, which lie on the scan by chance, and one ring around
-    them, so that walls of a pit are no zigzag."""
-    for _ in range(VOTES):
-        off = off | (off - step @ off.astype(float) > 0.5)
+def _with_ring(off: Bools, step: csr_matrix) -> Bools:
+    """``off (n,)`` and one ring of vertices around them: among these are those that lie on the scan by chance, and
+    walls of a pit would be a zigzag without them."""
     out: Bools = off | (step @ off.astype(float) != 0.0)
     return out
 

@@ -33,7 +33,7 @@ def in_sight(scan: Scan, points: Floats) -> Bools:
         at, own = scan.vertices @ turn.T, points[left] @ turn.T
         low, high = (edge(at[np.unique(tri)], axis=0) for edge in (np.min, np.max))
         view = View((low[0], high[0]), (low[1], high[1]), PIXEL_MM)
-        depth = minimum_filter(view.draw([(at, tri)]).depth, 3)
+        depth = minimum_filter(view.draw([(at.astype(np.float32), tri)]).depth, 3)
         column, row = np.round((own[:, :2] - low[:2]) / PIXEL_MM).astype(np.int64).T
         row, column = (np.clip(k, 0, n - 1) for k, n in zip((row, column), depth.shape, strict=True))
         out[left] = own[:, 2] > depth[row, column] - SLACK_MM

@@ -53,16 +53,22 @@ def test_skin_is_brought_to_what_it_does_not_reach(start: str) -> None:
 def test_vertices_that_lie_on_the_scan_by_chance_do_not_hold_the_skin_back() -> None:
     skin = FLAT - np.column_stack([0 * X, 0 * X, CAVITY])
     off = CAVITY > 0.5
-    off[AT[19:21, 19:21].ravel()[:2]] = False
+    off[AT[19:21, 19:21]] = False
     made = cover(sheet(), skin, off, FLAT, UP)
     assert np.abs(made[:, 2]).max() < 0.9
 
 
-def test_skin_that_is_not_free_stays_and_skin_that_would_come_no_nearer_too() -> None:
+def test_skin_that_is_not_free_stays_and_skin_beside_a_place_too() -> None:
     skin = FLAT - np.column_stack([0 * X, 0 * X, CAVITY])
     assert cover(sheet(BEYOND > 8.0), skin, CAVITY > 0.5, FLAT, UP) is skin
     beside = FLAT[BEYOND < 3.0] + [0.0, 0.0, 40.0]  # nothing to do with the skin
     assert cover(sheet(), FLAT, np.ones(N * N, bool), beside, UP[: len(beside)]) is FLAT
+
+
+def test_skin_that_would_come_hardly_nearer_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    skin = FLAT - np.column_stack([0 * X, 0 * X, CAVITY])
+    monkeypatch.setattr(module, "LESS", 0.0)
+    assert cover(sheet(), skin, CAVITY > 0.5, FLAT, UP) is skin
 
 
 def test_places_of_few_samples_or_small_distances_are_none() -> None:

@@ -1,8 +1,10 @@
 """What lies inside a scan is not in sight; its outside is."""
 
 import numpy as np
+import pytest
 import trimesh
 
+from surface.fit.transfer.detail import hidden as module
 from surface.fit.transfer.detail.hidden import in_sight
 from surface.fit.transfer.scan import make_scan
 
@@ -32,6 +34,14 @@ def test_the_floor_of_a_pit_is_in_sight_and_teeth_behind_closed_lips_are_not() -
     scan = joined(trimesh.Trimesh(floor, faces, process=False), teeth)
     assert in_sight(scan, floor[np.hypot(x, y) < 6.0]).all()
     assert not in_sight(scan, np.array([[0.0, 20.0, -4.0], [3.0, 21.0, -4.0]])).any()
+
+
+def test_steep_slopes_are_in_sight_in_a_single_view(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "VIEWS", ((0.0, 0.0),))
+    ball = trimesh.creation.icosphere(4, 60.0)
+    places = ball.triangles_center
+    assert in_sight(joined(ball), places[places[:, 2] > 20.0]).all()
+    assert not in_sight(joined(ball), places[places[:, 2] < -20.0]).any()
 
 
 def test_a_scan_of_no_triangles_shows_nothing() -> None:
