@@ -15,7 +15,6 @@ from surface.base.jit import inlined, nonallocating
 from surface.spline.lanes import (
     add,
     div,
-    fence,
     fma,
     item,
     load,
@@ -35,7 +34,6 @@ from surface.spline.lanes import (
 from .binding import arrays_of
 from .groupsums import HEAD, STEP, factor_counts, join_all, join_values, sum_groups, takes_whole
 from .packedsums import AHEAD, sum_all_packed, sum_packed, write_lanes
-from .streaming import choose_places, stream_cell
 
 AHEAD_OUT = 384  # coordinates of vertices that are fetched before they are written: 16 tiles
 MAX_SQUARE = np.float32(1e36)  # of a vector's length
@@ -262,27 +260,23 @@ def write_packed(
 
 
 @nonallocating
-def compute_cells(table, cells, begin, end, sign, local, scratch, starts, staged):
+def compute_cells(table, cells, begin, end, sign, local, scratch, starts):
     """Compute ``cells[begin:end]`` from their control points; their numerators are no longer stored.
 
-    ``local``, ``scratch``, ``starts``, ``staged`` : scratch space, of which every thread has its own. Cells are written
-    past the caches if there is a place ``staged`` for the vertices and normals of one.
+    ``local``, ``scratch``, ``starts`` : scratch space, of which every thread has its own.
     """
     arrays = arrays_of(table)
-    cell_start, tile_start, all_rows, capacity, at, ids_at, ids, value, slope = arrays[:9]
+    cell_start, tile_start, all_rows, room, at, ids_at, ids, value, slope = arrays[:9]
     points, origin, inv_w, dw, _, differences, vertices, normals = arrays[13:21]
     rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:39]
     packed_at, tile_entry, entry_row, packed, packed_slope, _, _, order_at, order = arrays[39:48]
-    streams, out, out_normals = choose_places(staged, vertices, normals)
     for q in range(begin, end):
         c = cells[q]
         differences[c] = -1
-        rows, begins, count, pack_at = all_rows[c], cell_start[c], cell_start[c + 1] - cell_start[c], packed_at[c]
-        first = 0 if streams else begins
-        last = first + count
+        rows, first, last, pack_at = all_rows[c], cell_start[c], cell_start[c + 1], packed_at[c]
         gather(points, ids, ids_at[c], rows, origin, c, local)
         px, py, pz = splat(np.float32(origin[c, 0])), splat(np.float32(origin[c, 1])), splat(np.float32(origin[c, 2]))
-        place, step, row, pick_at, tile = at[c], capacity[c] * 8, rows_at[c], picks_at[c] + HEAD, tile_start[c]
+        place, step, row, pick_at, tile = at[c], room[c] * 8, rows_at[c], picks_at[c] + HEAD, tile_start[c]
         wide_u, wide_v = factor_counts(row, picks_at[c], picks)
         groups, whole = 0, takes_whole(row, picks_at[c], picks)
         if row >= 0:
@@ -292,16 +286,16 @@ def compute_cells(table, cells, begin, end, sign, local, scratch, starts, staged
         if dw.shape[0] == 0 and row >= 0:
             write_joined(
                 first, last, tile, groups, wide_u, whole, pick_at, px, py, pz, factors, picks, starts, order, scratch,
-                inv_w, out,
+                inv_w, vertices,
             )  # fmt: skip
         elif dw.shape[0] == 0 and pack_at >= 0:
             write_packed(
                 first, last, tile, pack_at, px, py, pz, packed, entry_row, tile_entry, inv_w, local, order_at[c], order,
-                scratch, out,
+                scratch, vertices,
             )  # fmt: skip
         elif dw.shape[0] == 0:
             write_plain(
-                first, last, tile, place, step, rows, px, py, pz, value, inv_w, local, order, scratch, out
+                first, last, tile, place, step, rows, px, py, pz, value, inv_w, local, order, scratch, vertices
             )  # fmt: skip
         else:
             for vertex in range(first, last, 8):
@@ -319,14 +313,11 @@ def compute_cells(table, cells, begin, end, sign, local, scratch, starts, staged
                 x, y, z = positions_of(tile, x, y, z, inv_w)
                 nx, ny, nz = normals_of(tile, x, y, z, ax, ay, az, bx, by, bz, sign, dw)
                 x, y, z = add(x, px), add(y, py), add(z, pz)
-                write_lanes(out, first, last, vertex, order_at[c], order, x, y, z, scratch)
-                write_lanes(out_normals, first, last, vertex, order_at[c], order, nx, ny, nz, scratch)
+                write_lanes(vertices, first, last, vertex, order_at[c], order, x, y, z, scratch)
+                write_lanes(normals, first, last, vertex, order_at[c], order, nx, ny, nz, scratch)
                 place += step
                 pick_at += STEP
                 tile += 1
-        if streams:
-            stream_cell(staged, count, begins, vertices, normals)
-    fence()
 
 
 @nonallocating

@@ -25,14 +25,14 @@ WEIGHT_BYTES = 12  # of a weight and of its derivatives in u and v
 
 
 @nonallocating
-def compute_copies(tables, copies, cells, cuts, sign, local, scratch, starts, staged):  # type: ignore[no-untyped-def]
+def compute_copies(tables, copies, cells, cuts, sign, local, scratch, starts):  # type: ignore[no-untyped-def]
     """Compute all ``cells`` of ``copies (k,)``, one slice ``cuts[i]`` to ``cuts[i + 1]`` after the other.
 
-    ``tables (h, 2 n)`` : what each copy passes to :func:`.apply.compute_cells`; the last four are its scratch space.
+    ``tables (h, 2 n)`` : what each copy passes to :func:`.apply.compute_cells`; the last three are its scratch space.
     """
     for part in range(len(cuts) - 1):
         for k in range(len(copies)):
-            compute_cells(tables[copies[k]], cells, cuts[part], cuts[part + 1], sign, local, scratch, starts, staged)
+            compute_cells(tables[copies[k]], cells, cuts[part], cuts[part + 1], sign, local, scratch, starts)
 
 
 class DeformationBatch:

@@ -30,7 +30,6 @@ from .denominators import denominators, farthest, first_unusable
 from .lists import LANES, Basis, build_lists
 from .merging import merge_cells
 from .storage import compress
-from .streaming import MIN_BYTES
 from .updates import REFUSED, measure, move_points
 from .working import middles, work_arrays
 
@@ -286,7 +285,6 @@ class Deformation(Generic[Table]):
         self._arrays["local"] = np.zeros((int(self.lists.rows.max(initial=0)) + 1, 3), dtype=np.float32)
         self._arrays["starts"] = np.zeros(len(self._arrays["local"]), dtype=np.int32)
         self._arrays["scratch"] = np.zeros(self.storage.factors.sums, dtype=np.float32)
-        self._arrays["staged"] = np.zeros(self._room(), dtype=np.float32)
         self._addresses = address_table(self.addressed())
 
     def _sum_weights(self, cells: Ints) -> None:
@@ -322,13 +320,7 @@ class Deformation(Generic[Table]):
 
     def _scratch(self) -> list[np.ndarray]:
         """Return scratch space of the kernels."""
-        return [self._arrays[name] for name in ("local", "scratch", "starts", "staged")]
-
-    def _room(self) -> int:
-        """Return how many numbers the vertices and normals of a cell take at most, where they are streamed; else 0."""
-        written = self._arrays["vertices"].nbytes + self._arrays["normals"].nbytes
-        largest = int(np.diff(self.lists.tile_start).max(initial=0)) * LANES
-        return 6 * largest if written >= MIN_BYTES else 0
+        return [self._arrays[name] for name in ("local", "scratch", "starts")]
 
     def _compute_in_parts(self) -> None:
         """Threads take parts with equal shares of the weights, one after the other: a delayed thread does fewer."""

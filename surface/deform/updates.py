@@ -224,7 +224,7 @@ def update_cells(table, count, limit, bias, sign):
             every, touched, scratch,
         )  # fmt: skip
     if again > 0:
-        compute_cells(table, recomputed, np.int64(0), again, sign, local, scratch, starts, scratch[:0])
+        compute_cells(table, recomputed, np.int64(0), again, sign, local, scratch, starts)
     return total
 
 

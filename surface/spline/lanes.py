@@ -244,28 +244,6 @@ def store_difference(context, builder, kinds, args):
     return context.get_dummy_value()
 
 
-@_operation(types.void, None, types.intp, lanes)
-def stream(context, builder, kinds, args):
-    """Do the same as :func:`store` at a multiple of 32 bytes, past the caches: :func:`fence` comes after the last."""
-    stored = builder.store(args[2], _pointer(context, builder, kinds[0], *args[:2]), align=4 * LANES)
-    stored.set_metadata("nontemporal", builder.module.add_metadata([INDEX(1)]))
-    return context.get_dummy_value()
-
-
-@_operation(types.void)
-def fence(context, builder, kinds, args):
-    """Let other threads see everything that was stored before."""
-    builder.fence("seq_cst")
-    return context.get_dummy_value()
-
-
-@_operation(types.intp, None)
-def address(context, builder, kinds, args):
-    """The address of an array's first number."""
-    data = context.make_array(kinds[0])(context, builder, args[0]).data
-    return builder.ptrtoint(data, ir.IntType(types.intp.bitwidth))
-
-
 @_operation(types.void, None, types.intp, None, types.intp, lanes, lanes, lanes)
 def store3_at(context, builder, kinds, args):
     """``out[index + 3 * order[first + k] : ][: 3] = x[k], y[k], z[k]`` for ``out, index, order, first, x, y, z``; the
