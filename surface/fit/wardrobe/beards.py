@@ -18,7 +18,7 @@ _ANGLES = np.array([0.0, 8.0, 15.0, 20.0, 24.0, 32.0, 45.0, 60.0, 75.0, 87.0, 95
 _UPPER = np.array([-13.0, -12.0, -13.0, -16.5, -22.0, -27.5, -31.0, -25.0, -8.0, 12.0, 14.0])
 _LOWER = np.array([-94.0, -94.0, -93.0, -92.0, -90.0, -88.0, -84.0, -76.0, -60.0, -32.0, -4.0])
 _BELOW = np.array([-44.0, -44.0, -42.0, -36.0, -28.0, -27.5, -31.0, -25.0, -8.0, 12.0, 14.0])
-_LIP = np.array([-23.5, -24.0, -26.0, -29.5, -34.0])  # lower line of the moustache, at the first five angles: it ends
+_LIP = np.array([-23.5, -24.0, -26.0, -29.3, -33.2])  # lower line of the moustache, at the first five angles: it ends
 # level with the corners of the mouth, since one that hangs over them makes every face look sad
 _EDGE_DEG = 90.0
 _LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.2])
