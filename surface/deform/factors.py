@@ -263,7 +263,7 @@ def _factor_cells(
     lanes_u, lanes_v, ascending = np.zeros(widest, np.int64), np.zeros(widest, np.int64), np.arange(widest)
     values_u, values_v, numbers = np.zeros((widest, 2)), np.zeros((widest, 2)), np.zeros((widest, 2))
     row, work = np.zeros(2 * widest, np.float32), np.zeros(12)
-    picks_each, picks_whole = np.zeros(HEAD + STEP * most, np.int32), np.zeros(HEAD + STEP * most, np.int32)
+    own_picks, picks_whole = np.zeros(HEAD + STEP * most, np.int32), np.zeros(HEAD + STEP * most, np.int32)
     picks_whole[2] = 1
     bits, table = row.view(np.int32), factors.view(np.int32)
     for c in range(rows.shape[0]):
@@ -275,19 +275,18 @@ def _factor_cells(
         groups = _count_groups(knots_v, pv, points)
         wide_u, wide_v = (many_u + 7) // 8 * 8, (many_v + 7) // 8 * 8
         ranks_u, ranks_v = ascending[:many_u], ascending[:many_v]
-        own, plain = picks_each, (9 if slopes else 3) * entries[c]
+        own, plain = own_picks, (9 if slopes else 3) * entries[c]
         fits = _put_windows(rank_u, size, wide_u, 0, tiles, own) and _put_windows(rank_v, size, wide_v, 1, tiles, own)
         operations = _count_operations(rows[c], groups, tiles, wide_u, False, slopes)
         fits = fits and operations <= cost * plain
-        limit = min(cost, 1.0) * plain
-        limit = min(limit, operations) if fits else limit
-        all_u = _put_whole_windows(rank_u, size, 0, tiles, lanes_u, picks_whole)
-        all_v = _put_whole_windows(rank_v, size, 1, tiles, lanes_v, picks_whole)
-        few = all_u + all_v <= MAX_WHOLE * (wide_u + wide_v)
-        whole = few and _count_operations(rows[c], groups, tiles, all_u, True, slopes) <= limit
+        limit = min(min(cost, 1.0) * plain, operations if fits else plain)
+        whole_u = _put_whole_windows(rank_u, size, 0, tiles, lanes_u, picks_whole)
+        whole_v = _put_whole_windows(rank_v, size, 1, tiles, lanes_v, picks_whole)
+        few = whole_u + whole_v <= MAX_WHOLE * (wide_u + wide_v)
+        whole = few and _count_operations(rows[c], groups, tiles, whole_u, True, slopes) <= limit
         if whole:
-            fits, wide_u, wide_v, own = True, all_u, all_v, picks_whole
-            ranks_u, ranks_v = lanes_u[:all_u], lanes_v[:all_v]
+            fits, wide_u, wide_v, own = True, whole_u, whole_v, picks_whole
+            ranks_u, ranks_v = lanes_u[:whole_u], lanes_v[:whole_v]
         if not fits or used[1] + each * (wide_u + wide_v) * rows[c] > min(MAX_NUMBERS, len(factors)):
             continue
         for k in range(rows[c]):

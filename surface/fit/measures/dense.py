@@ -128,6 +128,34 @@ class _ContactMoves:
         return alone
 
 
+class _OnPurpose:
+    """Finds how far a head goes otherwise than its mesh on purpose, see :mod:`.purposes`.
+
+    whole : the head with the rules that change shapes; None if that is not asked for. changed : these shapes.
+    otherwise, stiff : the furthest place that a rule moves, and that a part leaves out which follows skull or jaw.
+    """
+
+    def __init__(self, whole: HeadData | None, changed: list[str]) -> None:
+        self._shown = None if whole is None else Subject(Head(whole))
+        self._changed = changed
+        self.otherwise: Spot | None = None
+        self.stiff: Spot | None = None
+
+    def follow(self, pair: _Pair, mesh: FitMesh, own: Floats, shape: str, subject: Subject, places: Places) -> Floats:
+        """Return vertices (n, 3) of the mesh as a part is meant to show them; ``own (n, 3)`` are those of the shape."""
+        if pair.follows not in RIGID:
+            return own
+        moved = moved_as_a_whole(subject, pair.follows, mesh.vertices, shape)
+        self.stiff = _greater(self.stiff, pair.furthest_of_mesh(own, moved, shape, places))
+        return moved
+
+    def compare(self, pair: _Pair, surface: Floats, shape: str, places: Places) -> None:
+        """Note how far the rules move ``surface (m, 3)``, the vertices of one part without them."""
+        if self._shown is not None and shape in self._changed:
+            both_ways = surface, _posed(self._shown, shape, pair.number)
+            self.otherwise = _greater(self.otherwise, pair.furthest(*both_ways, shape, places))
+
+
 def measure_dense(
     head: HeadData, mesh: FitMesh, sources: dict[str, list[int]], parts: Sequence[FittedPart], limit: float = np.inf,
     *, fit_alone: bool = False,
@@ -143,7 +171,7 @@ def measure_dense(
     """
     whole, (head, changed) = head, without_changes(head)
     subject = Subject(Head(head))
-    shown = Subject(Head(whole)) if fit_alone and changed else None
+    purposes = _OnPurpose(whole if fit_alone and changed else None, changed)
     free = _ContactMoves(head) if fit_alone and head.contacts else None
     places = Places(subject, find_mouth(subject))
     numbers = {p.name: k for k, p in enumerate(subject.parts)}
@@ -154,20 +182,14 @@ def measure_dense(
     found: dict[str, dict[str, Both]] = {p.name: {} for p in pairs}
     worst: dict[bool, Spot] = {}
     apart: Spot | None = None
-    otherwise: Spot | None = None
-    stiff: Spot | None = None
     sticking: dict[tuple[str, str], Floats] = {}
     turned: dict[tuple[str, str], Turned] = {}
     for shape in (NEUTRAL, *(n for n in sources if n in subject.claimed)):
         own = mesh.vertices + displacement(mesh, sources, shape, head.jaw)
         for pair in pairs:
-            surface, moved = _posed(subject, shape, pair.number), own
-            if pair.follows in RIGID:
-                moved = moved_as_a_whole(subject, pair.follows, mesh.vertices, shape)
-                stiff = _greater(stiff, pair.furthest_of_mesh(own, moved, shape, places))
-            if shown is not None and shape in changed:
-                both_ways = surface, _posed(shown, shape, pair.number)
-                otherwise = _greater(otherwise, pair.furthest(*both_ways, shape, places))
+            surface = _posed(subject, shape, pair.number)
+            moved = purposes.follow(pair, mesh, own, shape, subject, places)
+            purposes.compare(pair, surface, shape, places)
             both = pair.distances(surface, moved)
             if len(places_out := pair.sticking(*both[0], limit)):
                 sticking[pair.name, shape] = places_out
@@ -190,7 +212,7 @@ def measure_dense(
     return DenseErrors(
         found, worst.get(False), worst.get(True), added, _pieces(mesh, rest), samples, sticking, turned,
         tuple(n for n in changed if n in sources), apart, parted, sealed,
-        otherwise, stiff,
+        purposes.otherwise, purposes.stiff,
     )  # fmt: skip
 
 
