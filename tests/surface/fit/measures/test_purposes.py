@@ -1,12 +1,13 @@
 """What a head does otherwise than its mesh on purpose."""
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from surface.fit.features.rigging import BACK_RULE, DROOP_RULE, LOW_RULE
+from surface.fit.measures import dense
 from surface.fit.measures.purposes import moved_as_a_whole, without_changes
 from surface.fit.points.report import DenseErrors, Spot
 from surface.head.model.data import HeadData, Jaw, Neck, Rule
@@ -51,3 +52,24 @@ def test_lines_say_how_far_that_goes() -> None:
     assert "they move a point by 6.70 mm at most: shape jawOpen, tongue (tongue)" in lines
     assert any("follow skull or jaw as a whole" in x and "3.10 mm at most: shape mouthPressLeft" in x for x in lines)
     assert not DenseErrors({}, None, None, (), (), 0, stiff=Spot(0.01, "jawOpen", "g", "g", False)).lines()
+
+
+def test_the_furthest_place_of_all_shapes_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Gums:
+        """A part that follows the skull; places are as far as the shape's name says."""
+
+        follows = "skull"
+
+        def furthest_of_mesh(self, before: object, after: object, shape: str, places: object) -> Spot:
+            return Spot(float(shape), shape, "gums_upper", "gums", False)
+
+    monkeypatch.setattr(dense, "moved_as_a_whole", lambda *_: np.ones((2, 3)))
+    purposes, own = dense._OnPurpose(None, []), np.zeros((2, 3))
+    part, mesh = cast(Any, Gums()), cast(Any, SimpleNamespace(vertices=own))
+    for shape in ("1.0", "3.0", "2.0"):
+        moved = purposes.follow(part, mesh, own, shape, cast(Any, None), cast(Any, None))
+        assert (moved == 1.0).all()
+    assert purposes.stiff is not None and purposes.stiff.mm == 3.0
+    part.follows = "skin"
+    assert purposes.follow(part, mesh, own, "9.0", cast(Any, None), cast(Any, None)) is own
+    assert purposes.stiff.mm == 3.0
