@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from small_head import small_head
 
+from controller.base.paths import find_config
 from surface.head import Head
 
 
@@ -62,3 +63,17 @@ def test_groups_reach_what_their_points_reach_and_less_without_small_moves(bound
 def test_times_of_what_is_left_are_measured(bound: ModuleType) -> None:
     whole, placing, sums = bound.least_times(Head(small_head()), "mouthPucker", 1)
     assert min(whole, placing, sums) > 0.0
+
+
+def test_of_placing_only_contacts_are_needed_whose_samples_move(bound: ModuleType) -> None:
+    head = Head.load(find_config("heads", "ict"))
+    watched = bound.Placing(head)
+
+    def needed(name: str) -> set[str]:
+        return set(watched.needed(head.values({}), head.values({name: 0.5})))
+
+    blink, yaw = needed("eyeBlinkLeft"), needed("headYaw")
+    assert {"face: groups", "face: lids", "left_lids", "sockets: left_lids"} <= blink
+    assert "face: groups" in yaw
+    assert not {label for label in yaw if label.rpartition(": ")[2] in {"lips", "left_lids", "right_lids"}}
+    assert 0.0 < watched.least_time("eyeBlinkLeft", 1) < 1e3
