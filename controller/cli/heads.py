@@ -341,12 +341,15 @@ def _decimate_and_shade(out: Path) -> bool:
     from surface.base.errors import MissingPackage, ViewError
     from surface.view.draw.decimate import decimate_head
     from surface.view.pictures.occlusion import shade_head
+    from surface.view.pictures.outside import find_outside
 
     with console.status("decimating triangles for live pictures"):
         decimate_head(out)
     try:
         with console.status("baking the shading"):
             shade_head(out)
+        with console.status("finding what can be seen of hair and accessories"):
+            find_outside(out)
     except (ViewError, MissingPackage):
         return False
     return True

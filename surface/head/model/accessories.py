@@ -40,6 +40,8 @@ class Accessory:
         colours; empty without one.
     shade : (m,) float32, how open to light each vertex lies, 0..1.
     alpha : ``OPAQUE``, ``MASK`` (nothing below ``cutoff`` is drawn) or ``BLEND``. two_sided : are backs drawn?
+    outside : (k, 3) int32, the sides of triangles that can be seen from anywhere around the head, counter-clockwise
+        there; None where that is not known.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Accessory:
     alpha: str = "OPAQUE"
     cutoff: float = 0.5
     two_sided: bool = True
+    outside: NDArray[np.int32] | None = None
 
     @property
     def repeats(self) -> bool:
@@ -110,6 +113,8 @@ def _packed(accessories: Sequence[Accessory]) -> dict[str, Array]:
     for k, one in enumerate(accessories):
         rows |= {f"{k}/{key}": getattr(one, key) for key in ("vertices", "normals", "uv", "triangles", "shade")}
         rows[f"{k}/texture"] = np.frombuffer(one.texture, np.uint8)
+        if one.outside is not None:
+            rows[f"{k}/outside"] = one.outside
     return rows
 
 
@@ -127,7 +132,7 @@ def _unpack(file: Sidecar) -> tuple[Accessory, ...]:
     for k, name in enumerate(names):
         try:
             rest = _texture(z, k), alphas[k], float(cutoffs[k]), bool(two_sided[k])
-            found.append(Accessory(name, kinds[k], *_mesh(z, k), _colour(colours[k]), *rest))
+            found.append(Accessory(name, kinds[k], *_mesh(z, k), _colour(colours[k]), *rest, _outside(z, k)))
         except ValueError as error:
             raise ValueError(f"{name!r}: {error}") from error
     return tuple(found)
@@ -166,14 +171,27 @@ def _mesh(arrays: Mapping[str, Array], k: int) -> tuple[Floats32, Floats32, Floa
     if m > MAX_VERTICES:
         raise ValueError(f"{k}/vertices holds {m} vertices, {MAX_VERTICES} are the most")
     normals, uv = _numbers(arrays, f"{k}/normals", (m, 3)), _numbers(arrays, f"{k}/uv", (m, 2))
-    triangles = arrays[f"{k}/triangles"]
-    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu" or not len(triangles):
-        raise ValueError(f"{k}/triangles is no table of triangles")
-    if len(triangles) > MAX_TRIANGLES:
-        raise ValueError(f"{k}/triangles holds {len(triangles)} triangles, {MAX_TRIANGLES} are the most")
-    if triangles.min() < 0 or triangles.max() >= m:
-        raise ValueError(f"{k}/triangles names vertices beyond the {m} there are")
-    return vertices, normals, uv, np.ascontiguousarray(triangles, np.int32), _numbers(arrays, f"{k}/shade", (m,))
+    triangles = _triangles(arrays, f"{k}/triangles", m, MAX_TRIANGLES)
+    if not len(triangles):
+        raise ValueError(f"{k}/triangles is empty")
+    return vertices, normals, uv, triangles, _numbers(arrays, f"{k}/shade", (m,))
+
+
+def _outside(arrays: Mapping[str, Array], k: int) -> NDArray[np.int32] | None:
+    key = f"{k}/outside"
+    return _triangles(arrays, key, len(arrays[f"{k}/vertices"]), 2 * MAX_TRIANGLES) if key in arrays else None
+
+
+def _triangles(arrays: Mapping[str, Array], key: str, vertices: int, most: int) -> NDArray[np.int32]:
+    """Return triangles (k, 3) of so many vertices, ``most`` of them at most."""
+    triangles = arrays[key]
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype.kind not in "iu":
+        raise ValueError(f"{key} is no table of triangles")
+    if len(triangles) > most:
+        raise ValueError(f"{key} holds {len(triangles)} triangles, {most} are the most")
+    if triangles.min(initial=0) < 0 or triangles.max(initial=0) >= vertices:
+        raise ValueError(f"{key} names vertices beyond the {vertices} there are")
+    return np.ascontiguousarray(triangles, np.int32)
 
 
 def _texture(arrays: Mapping[str, Array], k: int) -> bytes:

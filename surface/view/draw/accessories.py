@@ -51,6 +51,7 @@ class _Drawn:
     array: moderngl.VertexArray
     texture: moderngl.Texture
     buffers: tuple[moderngl.Buffer, ...]
+    two_sided: bool
 
 
 def accessory_programs(ctx: moderngl.Context, quality: str) -> dict[str, moderngl.Program]:
@@ -65,7 +66,8 @@ class AccessoryBuffers:
     """Accessories of a head on an OpenGL context.
 
     programs : those of :func:`accessory_programs`, whose lights and camera its owner sets.
-    simplified : textures are not mixed between their sizes, for pictures drawn in software.
+    simplified : textures are not mixed between their sizes, and of triangles only sides are drawn that can be seen, for
+        pictures drawn in software.
 
     What has a texture that cannot be read, or is larger than the driver draws, is drawn in one colour; a warning is
     logged.
@@ -76,7 +78,11 @@ class AccessoryBuffers:
         simplified: bool = False,
     ) -> None:  # fmt: skip
         self._ctx = ctx
-        self._drawn = [_buffers(ctx, mesh, programs[SOLID if _is_solid(mesh) else CLEAR]) for mesh in meshes]
+        self._drawn = [
+            _buffers(ctx, mesh, programs[SOLID if _is_solid(mesh) else CLEAR], outside=simplified)
+            for mesh in meshes
+            if not (simplified and _is_hidden(mesh))
+        ]
         if simplified:
             for one in self._drawn:
                 one.texture.filter = (ctx.LINEAR_MIPMAP_NEAREST, ctx.LINEAR)
@@ -116,7 +122,7 @@ class AccessoryBuffers:
             "multisampled": int(covering), "soft": _SOFT.get(accessory.kind, 0.0), "gloss": _GLOSS[accessory.kind],
         })  # fmt: skip
         one.texture.use(_UNIT)
-        culled = 0 if accessory.two_sided else ctx.CULL_FACE
+        culled = 0 if one.two_sided else ctx.CULL_FACE
         ctx.enable_only(ctx.DEPTH_TEST | culled | (ctx.BLEND if alpha == _REST else 0))
         if covering:
             ctx.enable_direct(_ALPHA_TO_COVERAGE)
@@ -137,16 +143,26 @@ def _is_solid(mesh: WornMesh) -> bool:
     return mesh.accessory.alpha == "OPAQUE"
 
 
-def _buffers(ctx: moderngl.Context, mesh: WornMesh, program: moderngl.Program) -> _Drawn:
+def _is_hidden(mesh: WornMesh) -> bool:
+    """Whether nothing of it can be seen."""
+    outside = mesh.accessory.outside
+    return outside is not None and not len(outside)
+
+
+def _buffers(ctx: moderngl.Context, mesh: WornMesh, program: moderngl.Program, *, outside: bool) -> _Drawn:
+    """Buffers of an accessory; ``outside`` : only of the sides that can be seen, where these are known."""
     accessory = mesh.accessory
+    sides = accessory.outside if outside else None
+    triangles = accessory.triangles if sides is None else sides
     rows = np.hstack(
         [accessory.vertices, accessory.normals, accessory.uv, mesh.share[:, None], accessory.shade[:, None]]
     )
     vertices = ctx.buffer(np.ascontiguousarray(rows, np.float32).tobytes())
-    index = ctx.buffer(np.ascontiguousarray(accessory.triangles, np.int32).tobytes())
+    index = ctx.buffer(np.ascontiguousarray(triangles, np.int32).tobytes())
     content: Any = [(vertices, "3f 3f 2f 1f 1f", "position", "normal", "uv", "share", "shade")]
     array = ctx.vertex_array(program, content, index_buffer=index, index_element_size=4)
-    return _Drawn(mesh, program, array, _texture(ctx, accessory), (vertices, index))
+    two_sided = accessory.two_sided and sides is None
+    return _Drawn(mesh, program, array, _texture(ctx, accessory), (vertices, index), two_sided)
 
 
 def _texture(ctx: moderngl.Context, accessory: Accessory) -> moderngl.Texture:

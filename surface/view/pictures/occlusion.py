@@ -38,7 +38,7 @@ _THICK_MM = 11.0
 _NEIGHBOURS = 220
 _NOTHING = np.zeros((0, 3))
 #: Pose in which mouth and lids show what they hide at rest.
-_OPEN = {"jawOpen": 0.45, "eyeBlinkLeft": 0.8, "eyeBlinkRight": 0.8}
+OPEN = {"jawOpen": 0.45, "eyeBlinkLeft": 0.8, "eyeBlinkRight": 0.8}
 
 
 def bake_head(head: ViewHead, open_pose: np.ndarray, **options: Any) -> dict[str, np.ndarray]:
@@ -251,5 +251,5 @@ def shade_head(folder: str | Path) -> Path:
     shade_path(folder).unlink(missing_ok=True)
     head = Head(load_data(folder), str(folder))  # without the files beside it, which may belong to another head
     head.accessories = tuple(WornMesh(one, head.data.neck) for one in read_accessories(folder))
-    open_pose = np.array([_OPEN.get(name, 0.0) for name in head.parameters])
+    open_pose = np.array([OPEN.get(name, 0.0) for name in head.parameters])
     return write_shade(folder, bake_head(head, open_pose), head.parts)

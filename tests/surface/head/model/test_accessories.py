@@ -19,10 +19,12 @@ from surface.head.model.sidecar import FORMAT
 def test_all_of_them_come_back(tmp_path: Path) -> None:
     jpeg = picture(RED[:3], kind="JPEG")
     glasses = replace(card(), name="Brille 眼鏡", kind="glasses", texture=jpeg, alpha="BLEND", two_sided=False)
-    wanted = [replace(card(), colour=(0.5, 0.25, 1.0, 0.5), alpha="MASK", cutoff=0.25), glasses]
+    turned = np.array([[2, 1, 0]], np.int32)
+    wanted = [replace(card(), colour=(0.5, 0.25, 1.0, 0.5), alpha="MASK", cutoff=0.25), glasses,
+              replace(card(), outside=turned)]  # fmt: skip
     assert write_accessories(tmp_path, wanted) == tmp_path / FILE
     found = read_accessories(tmp_path)
-    assert [one.mime for one in found] == ["image/png", "image/jpeg"]
+    assert [one.mime for one in found] == ["image/png", "image/jpeg", "image/png"]
     for one, other in zip(found, wanted, strict=True):
         for field in fields(one):
             np.testing.assert_array_equal(getattr(one, field.name), getattr(other, field.name))
@@ -71,7 +73,9 @@ def test_negative_and_no_triangles_are_refused_too_and_a_newer_version(tmp_path:
     assert path is not None
     arrays = dict(np.load(path))
     for key, array in (
-        ("0/triangles", np.array([[0, 1, -1]])), ("0/triangles", np.zeros((0, 3), np.int32)), (FORMAT, np.array([99])),
+        ("0/triangles", np.array([[0, 1, -1]])), ("0/outside", np.array([[0, 1, 4]])), ("0/outside", np.ones((1, 3))),
+        ("0/outside", np.zeros((9, 2), np.int32)), ("0/triangles", np.zeros((0, 3), np.int32)),
+        (FORMAT, np.array([99])),
     ):  # fmt: skip
         np.savez_compressed(path, **{**arrays, key: array})
         with pytest.raises(HeadFileError):
