@@ -2,7 +2,8 @@
 
 Only skin counts that can be seen from outside at rest: what lines the mouth may overlap the teeth as it likes. The
 depth of an overlap is the one that is exceeded over 10 mm² of skin: single vertices that lie deeper, as in the corners
-of mouth and eyes, are not seen.
+of mouth and eyes, are not seen. Flesh lies between skin and what lines the mouth, and is left through either: without
+the lining, a lip that reaches a little into the other would be as deep in it as the chin or the nose is away.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Floats32, Ints
-from surface.check.crossings import Crossings
+from surface.check.crossings import NO_KIND, Crossings
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import find_mouth
 from surface.check.places import Places
@@ -31,6 +32,7 @@ MAX_DEPTH_MM = 12.0  # of an overlap that is measured
 MIN_DEPTH_MM = 0.3
 MIN_REPORTED_MM = 1.0  # overlaps below this are not reported at the end of a fit
 AREA_MM2 = 10.0
+LINING = "mouth"  # material of what lines the mouth: flesh lies between it and the skin
 MOVED_MM = 0.1  # what moves less counts as unmoved
 VIEWS = ((0.0, 0.0), (45.0, 0.0), (-45.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (180.0, 0.0), (0.0, -40.0), (0.0, 40.0))
 STEP_MM = 0.8  # pixel size of the pictures that determine what is visible
@@ -83,8 +85,8 @@ class _Body:
     """Skin, eyeballs and teeth of a head as one mesh."""
 
     def __init__(self, subject: Subject) -> None:
-        self._subject, self._kinds = subject, list(LIMITS_MM)
-        drawn = [k for k, p in enumerate(subject.parts) if p.material in LIMITS_MM and len(p.triangles)]
+        self._subject, self._kinds = subject, [*LIMITS_MM, LINING]
+        drawn = [k for k, p in enumerate(subject.parts) if p.material in self._kinds and len(p.triangles)]
         self.numbers = drawn if any(subject.parts[k].material == "skin" for k in drawn) else []
         if not self.numbers:
             return
@@ -95,8 +97,8 @@ class _Body:
         self._rest = self._at(subject.rest)
         cells = np.round(self._rest / (1e-3 * subject.scale))
         same = np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1)
-        meets = np.zeros((len(LIMITS_MM),) * 2, bool)
-        meets[0] = meets[:, 0] = True
+        meets = np.zeros((len(self._kinds),) * 2, bool)
+        meets[0, :-1] = meets[:-1, 0] = True
         seen = self._are_visible(triangles) & (kind == 0)
         self._crossings = Crossings(self._rest, triangles, same, kind, meets, seen)
         self._area = self._areas(triangles[seen], same)
@@ -134,7 +136,9 @@ class _Body:
             if material == "teeth" and shape not in TEETH_SHAPES:
                 continue
             kind = self._kinds.index(material)
-            rows, depth = self._crossings.depths(pairs, 0, kind, MAX_DEPTH_MM * scale, MIN_DEPTH_MM * scale)
+            least, most = MIN_DEPTH_MM * scale, MAX_DEPTH_MM * scale
+            lining = self._kinds.index(LINING) if material == "skin" else NO_KIND
+            rows, depth = self._crossings.depths(pairs, 0, kind, most, least, lining)
             order = np.argsort(-depth)
             wide = np.flatnonzero(np.cumsum(self._area[rows[order]]) >= AREA_MM2 * scale**2)
             if len(wide):
