@@ -123,7 +123,7 @@ def transfer(
     notes += [*scan.notes, *mended]
     notes += ["the face is symmetric, and was fitted symmetrically"] if mirrored else []
     if scan.colours is not None:
-        data, colour_notes = with_colours(data, scan.colours)
+        data, colour_notes = with_colours(data, scan.colours, scan.eye_colours)
         notes += colour_notes
     parts = face_reports(data, template, done.warp, shown)
     registered = registration_errors(template, done, matcher, STAGES[-1].farthest)
