@@ -80,6 +80,8 @@ def test_a_plan_has_the_lining_as_a_cavity_with_the_look_of_a_mouth() -> None:
     )
     assert next(iter(parts)) == "face"
     assert parts["cavity"][0].request.points == POINTS + SPARE and parts["cavity"][0].request.spare == SPARE > 0
+    assert parts["cavity"][0].request.dense and not parts["face"][0].request.dense
+    assert parts["cavity"][0].budget[1] < parts["face"][0].budget[1]
     vertices = np.concatenate([i.vertex for i in parts["cavity"][1]])
     assert (vertices >= OUTER).mean() > 0.7
     faces = np.concatenate([i.vertex for i in parts["face"][1]])
