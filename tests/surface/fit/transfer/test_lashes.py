@@ -60,6 +60,7 @@ def test_what_the_map_did_to_the_lashes_alone_is_taken_back_and_larger_eyes_have
         lashes_of(rooted_lashes(replace(stretched, eye_radius=1.5 * stretched.eye_radius), source)), BLINK
     )
     lid = moves_of(lashes_of(rooted_lashes(replace(stretched, eye_radius=0.0), source)), BLINK)  # nothing beside it
+    assert np.abs(before - lid).max() > 5.0
     np.testing.assert_allclose(larger - lid, 1.5 * (before - lid), atol=1e-4)
 
 
