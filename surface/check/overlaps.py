@@ -13,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surface.base.arrays import Bools, Floats, Floats32, Ints
+from surface.base.arrays import Floats, Floats32, Ints
 from surface.check.crossings import NO_KIND, Crossings
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import find_mouth
 from surface.check.places import Places
-from surface.check.raster import NOTHING, View, view_rotation
+from surface.check.sight import are_visible
 from surface.check.subject import Subject
 from surface.head import Head
 from surface.head.model.data import HeadData
@@ -34,9 +34,6 @@ MIN_REPORTED_MM = 1.0  # overlaps below this are not reported at the end of a fi
 AREA_MM2 = 10.0
 LINING = "mouth"  # material of what lines the mouth: flesh lies between it and the skin
 MOVED_MM = 0.1  # what moves less counts as unmoved
-VIEWS = ((0.0, 0.0), (45.0, 0.0), (-45.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (180.0, 0.0), (0.0, -40.0), (0.0, 40.0))
-STEP_MM = 0.8  # pixel size of the pictures that determine what is visible
-MAX_PIXELS = 900  # width or height of such a picture
 WORDS = {"skin": "itself", "eye": "the eyeball", "teeth": "the teeth"}
 
 
@@ -99,26 +96,12 @@ class _Body:
         same = np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1)
         meets = np.zeros((len(self._kinds),) * 2, bool)
         meets[0, :-1] = meets[:-1, 0] = True
-        seen = self._are_visible(triangles) & (kind == 0)
+        seen = are_visible(self._rest, triangles, subject.scale) & (kind == 0)
         self._crossings = Crossings(self._rest, triangles, same, kind, meets, seen)
         self._area = self._areas(triangles[seen], same)
 
     def _at(self, vertices: list[Floats32]) -> Floats:
         return np.concatenate([vertices[k] for k in self.numbers]).astype(np.float64)
-
-    def _are_visible(self, triangles: Ints) -> Bools:
-        """Return (t,): which triangles can be seen from outside at rest, or have a corner of such a one."""
-        seen = np.zeros(len(triangles), bool)
-        for yaw, pitch in VIEWS:
-            at = self._rest @ view_rotation(yaw, pitch).T
-            (x0, y0, _), (x1, y1, _) = at.min(axis=0), at.max(axis=0)
-            step = max(STEP_MM * self._subject.scale, (x1 - x0) / MAX_PIXELS, (y1 - y0) / MAX_PIXELS)
-            shape = self._rest.astype(np.float32), triangles.astype(np.int32)
-            picture = View((x0, x1), (y0, y1), step, view_rotation(yaw, pitch)).draw([shape])
-            seen[picture.rows[picture.parts != NOTHING]] = True
-        corners = np.zeros(len(self._rest), bool)
-        corners[triangles[seen]] = True
-        return np.asarray(corners[triangles].any(axis=1))
 
     def _areas(self, triangles: Ints, same: Ints) -> Floats:
         """Return (n,): mm² of triangles that belongs to each vertex at rest; of those in one place together."""
