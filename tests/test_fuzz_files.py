@@ -32,7 +32,7 @@ pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="li
 @pytest.mark.slow
 def test_damaged_files_of_some_kinds_are_each_one_message() -> None:
     """The short form of ``make fuzz``."""
-    kinds = ["stage", "wav", "head.npz", "glb", "rhubarb"]
+    kinds = ["stage", "wav", "head.npz", "accessories.npz", "glb", "rhubarb"]
     command = [sys.executable, "-m", "tests.fuzz.files", "--count", "12", "--jobs", "1", "--only", *kinds]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr

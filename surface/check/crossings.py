@@ -15,6 +15,7 @@ from surface.base.jit import inlined, kernel, merged
 from surface.mesh.boxtree import LEAF, BoxTree
 
 ENCLOSED = 10.0  # maximum distance to the back of the flesh that encloses a point, in depths that are searched for
+NO_KIND = -1
 OBLIQUE = 1.5  # maximum depth of a vertex, relative to its distance from the crossing along its own surface
 
 
@@ -259,10 +260,12 @@ class Crossings:
             _search(rows, self._ids, self.kind, self._meets, moved, t.corners, t.low, t.high, t.leaves, out)
         return out[:used]
 
-    def depths(self, pairs: Ints, passing: int, passed: int, reach: float, least: float) -> tuple[Ints, Floats]:
+    def depths(
+        self, pairs: Ints, passing: int, passed: int, reach: float, least: float, lining: int = NO_KIND
+    ) -> tuple[Ints, Floats]:
         """Return vertices (k,) of triangles asked for, of a kind ``passing``, that lie behind triangles of a kind
         ``passed``, of pairs as :meth:`pairs` found them last, and how deep, mm: more than ``least``, no deeper than
-        ``reach``."""
+        ``reach``. A vertex is as deep as the back of the first triangle of ``passed`` or of the kind ``lining``."""
         both = np.concatenate([pairs, pairs[:, ::-1]])
         both = both[(self.kind[both[:, 0]] == passing) & (self.kind[both[:, 1]] == passed)]
         if not len(both):
@@ -274,7 +277,7 @@ class Crossings:
         ways, length, far, queue = self._seeds(both, way)
         used = _spread(self._start, self._beside, self._cut(both, cut), at, reach, ways, length, far, queue)
         found = queue[:used][self._shown[queue[:used]]]
-        depth = self._to_back(at, ways, found, reach, np.arange(len(self._meets)) == passed)
+        depth = self._to_back(at, ways, found, reach, np.isin(np.arange(len(self._meets)), (passed, lining)))
         deep = (depth > least) & (depth < OBLIQUE * (far[found] + length[found]))
         found, depth = found[deep], depth[deep]
         if passing == passed:  # what lies in the flesh sees a back outwards, too; the edge of a fold does not

@@ -2,7 +2,8 @@
 
 Only skin counts that can be seen from outside at rest: what lines the mouth may overlap the teeth as it likes. The
 depth of an overlap is the one that is exceeded over 10 mm² of skin: single vertices that lie deeper, as in the corners
-of mouth and eyes, are not seen.
+of mouth and eyes, are not seen. Flesh lies between skin and what lines the mouth, and is left through either: without
+the lining, a lip that reaches a little into the other would be as deep in it as the chin or the nose is away.
 """
 
 from __future__ import annotations
@@ -12,12 +13,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surface.base.arrays import Bools, Floats, Floats32, Ints
-from surface.check.crossings import Crossings
+from surface.base.arrays import Floats, Floats32, Ints
+from surface.check.crossings import NO_KIND, Crossings
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import find_mouth
 from surface.check.places import Places
-from surface.check.raster import NOTHING, View, view_rotation
+from surface.check.sight import are_visible
 from surface.check.subject import Subject
 from surface.head import Head
 from surface.head.model.data import HeadData
@@ -31,10 +32,8 @@ MAX_DEPTH_MM = 12.0  # of an overlap that is measured
 MIN_DEPTH_MM = 0.3
 MIN_REPORTED_MM = 1.0  # overlaps below this are not reported at the end of a fit
 AREA_MM2 = 10.0
+LINING = "mouth"  # material of what lines the mouth: flesh lies between it and the skin
 MOVED_MM = 0.1  # what moves less counts as unmoved
-VIEWS = ((0.0, 0.0), (45.0, 0.0), (-45.0, 0.0), (90.0, 0.0), (-90.0, 0.0), (180.0, 0.0), (0.0, -40.0), (0.0, 40.0))
-STEP_MM = 0.8  # pixel size of the pictures that determine what is visible
-MAX_PIXELS = 900  # width or height of such a picture
 WORDS = {"skin": "itself", "eye": "the eyeball", "teeth": "the teeth"}
 
 
@@ -83,8 +82,8 @@ class _Body:
     """Skin, eyeballs and teeth of a head as one mesh."""
 
     def __init__(self, subject: Subject) -> None:
-        self._subject, self._kinds = subject, list(LIMITS_MM)
-        drawn = [k for k, p in enumerate(subject.parts) if p.material in LIMITS_MM and len(p.triangles)]
+        self._subject, self._kinds = subject, [*LIMITS_MM, LINING]
+        drawn = [k for k, p in enumerate(subject.parts) if p.material in self._kinds and len(p.triangles)]
         self.numbers = drawn if any(subject.parts[k].material == "skin" for k in drawn) else []
         if not self.numbers:
             return
@@ -95,28 +94,14 @@ class _Body:
         self._rest = self._at(subject.rest)
         cells = np.round(self._rest / (1e-3 * subject.scale))
         same = np.unique(cells, axis=0, return_inverse=True)[1].reshape(-1)
-        meets = np.zeros((len(LIMITS_MM),) * 2, bool)
-        meets[0] = meets[:, 0] = True
-        seen = self._are_visible(triangles) & (kind == 0)
+        meets = np.zeros((len(self._kinds),) * 2, bool)
+        meets[0, :-1] = meets[:-1, 0] = True
+        seen = are_visible(self._rest, triangles, subject.scale) & (kind == 0)
         self._crossings = Crossings(self._rest, triangles, same, kind, meets, seen)
         self._area = self._areas(triangles[seen], same)
 
     def _at(self, vertices: list[Floats32]) -> Floats:
         return np.concatenate([vertices[k] for k in self.numbers]).astype(np.float64)
-
-    def _are_visible(self, triangles: Ints) -> Bools:
-        """Return (t,): which triangles can be seen from outside at rest, or have a corner of such a one."""
-        seen = np.zeros(len(triangles), bool)
-        for yaw, pitch in VIEWS:
-            at = self._rest @ view_rotation(yaw, pitch).T
-            (x0, y0, _), (x1, y1, _) = at.min(axis=0), at.max(axis=0)
-            step = max(STEP_MM * self._subject.scale, (x1 - x0) / MAX_PIXELS, (y1 - y0) / MAX_PIXELS)
-            shape = self._rest.astype(np.float32), triangles.astype(np.int32)
-            picture = View((x0, x1), (y0, y1), step, view_rotation(yaw, pitch)).draw([shape])
-            seen[picture.rows[picture.parts != NOTHING]] = True
-        corners = np.zeros(len(self._rest), bool)
-        corners[triangles[seen]] = True
-        return np.asarray(corners[triangles].any(axis=1))
 
     def _areas(self, triangles: Ints, same: Ints) -> Floats:
         """Return (n,): mm² of triangles that belongs to each vertex at rest; of those in one place together."""
@@ -134,7 +119,9 @@ class _Body:
             if material == "teeth" and shape not in TEETH_SHAPES:
                 continue
             kind = self._kinds.index(material)
-            rows, depth = self._crossings.depths(pairs, 0, kind, MAX_DEPTH_MM * scale, MIN_DEPTH_MM * scale)
+            least, most = MIN_DEPTH_MM * scale, MAX_DEPTH_MM * scale
+            lining = self._kinds.index(LINING) if material == "skin" else NO_KIND
+            rows, depth = self._crossings.depths(pairs, 0, kind, most, least, lining)
             order = np.argsort(-depth)
             wide = np.flatnonzero(np.cumsum(self._area[rows[order]]) >= AREA_MM2 * scale**2)
             if len(wide):

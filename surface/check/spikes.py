@@ -1,4 +1,4 @@
-"""Find spikes: points that stick out from the surface on all sides, at rest or in a pose.
+"""Find spikes: points that stick out from the surface on all sides, at rest, where they can be seen, or in a pose.
 
 The height of a vertex is its least distance, along one direction, above the samples on a ring of some millimetres
 around it. A ridge, such as the rim of an ear or of a lid, has no height: the ring meets the ridge on either side.
@@ -18,6 +18,7 @@ from surface.check.borders import Borders
 from surface.check.cells import any_nearer, cubes, sort_into_cells
 from surface.check.findings import AGAIN, Finding
 from surface.check.places import Places
+from surface.check.sight import seen_vertices
 from surface.check.subject import Subject
 from surface.head.model.parameters import SHAPES
 
@@ -233,6 +234,7 @@ def _spikes(
     rings = Rings(at, samples.vertices, radius)
     height = drop_rims(at, rims, rings.heights(at), PAIRED * steep * radius, off)
     height[_may_stick_out(subject, at[: samples.vertices], height, places)] = 0.0
+    _drop_hidden(subject, samples, height, steep * radius)
     worst, best, name, where = int(height.argmax()), 0.0, "", 0
     for pose in (n for n in subject.claimed if n in SHAPES):
         moved = _heights_in_pose(
@@ -249,6 +251,15 @@ def _spikes(
         found("", worst, height[worst]) if height[worst] > steep * radius else None,
         found(f"with {name} = 1 ", where, best) if best > 0.0 else None,
     ]
+
+
+def _drop_hidden(subject: Subject, samples: Samples, height: Floats, least: float) -> None:
+    """Set ``height (k,)`` to 0 where nobody sees the sample at rest, as at the end of a bag that lines the mouth of a
+    head without shapes; nothing is asked where none is above ``least``."""
+    if (height > least).any():
+        seen = seen_vertices(subject)
+        for row in np.flatnonzero(height > 0.0):
+            height[row] *= seen[samples.part[row]][samples.corners[row, 0]]
 
 
 def _heights_in_pose(

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from surface.head import Head, save_data
+from surface.head.model.accessories import write_accessories
 from surface.head.model.data import Contact, HeadData, Rule
 from surface.head.model.file import load_data
 from surface.head.model.identity import Identity, fingerprint, save_identities
@@ -19,6 +20,7 @@ from surface.head.posing.baked import write_decimated, write_shade
 from surface.head.posing.fit_error import write_fit_error
 from tests.fuzz.kind import FIT_S, Kind
 from tests.fuzz.reading import reports
+from tests.surface.cards import RED, card, picture
 from tests.surface.small_head import all_points, small_head
 
 CONFIGS = Path(__file__).resolve().parents[2] / "configs"
@@ -60,6 +62,8 @@ def _save_head(folder: Path) -> None:
     write_shade(folder, {part.name: np.full(len(part.vertices), 0.5) for part in head.parts}, head.parts)
     write_fit_error(folder, {"a": np.linspace(0.0, 2.0, len(head.part("a").vertices))}, head.parts)
     write_decimated(folder, head.parts, {f"{part.name}/full": part.triangles for part in head.parts})
+    glasses = card(name="Glasses", kind="glasses", texture=picture(RED[:3], kind="JPEG"), alpha="BLEND")
+    write_accessories(folder, [card(), glasses, card(name="Band", texture=b"", colour=(0.2, 0.1, 0.1, 1.0))])
 
 
 def _heads(folder: Path) -> list[Kind]:

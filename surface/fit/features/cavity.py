@@ -13,8 +13,9 @@ from surface.fit.source.owncharts import faces_of
 from surface.fit.source.regions import sight
 
 NAME, MATERIAL = "cavity", "mouth"  # the part; contacts take it along with the lips
-POINTS, COARSE, ERROR_MM = 480, 0.1, 0.4  # its control points and the error that counts as 1, of a usual head
+POINTS, COARSE, ERROR_MM = 600, 0.1, 0.4  # its control points and the error that counts as 1, of a usual head
 SPARE = 180  # more of them, where it is far off: a bag opens from a small hole in (u, v), and an open jaw stretches it
+CHORD_MM = 0.25  # of its triangles, of a usual head: what is seen of it between parted lips is its edge there
 STILL, MOVED = 0.3, 0.5  # of the chin's way when the jaw opens: a lining holds what moves less, and what moves more
 SEEN = 0.12  # share of all directions in front of a face: what is seen from fewer lies inside
 INSIDE = 0.7  # of its area lies inside

@@ -139,7 +139,9 @@ def _skin(
     if inner:
         points, coarse, error = cavity.POINTS, cavity.COARSE, cavity.ERROR_MM
         made, own = _part(cavity.NAME, cavity.MATERIAL, points + cavity.SPARE, coarse, error, scale, inner, mesh)
-        out.append((replace(made, request=replace(made.request, spare=cavity.SPARE)), own))
+        request = replace(made.request, spare=cavity.SPARE, dense=True)
+        budget = made.budget[0], cavity.CHORD_MM * scale, made.budget[2]
+        out.append((replace(made, request=request, budget=budget), own))
     return out
 
 

@@ -37,6 +37,8 @@ class FitRequest:
     growth : most factor by which the net grows between two solves.
     finest : least spacing of a net, in spacings of the mesh's vertices.
     astray_mm : where the surface is further off, also between samples, it is mended; spare : points kept for that.
+    dense : are places between the samples samples from the start? For a coarse mesh, whose few vertices leave room for
+        bulges in between.
     """
 
     points: int
@@ -50,6 +52,7 @@ class FitRequest:
     finest: float = 1.2
     astray_mm: float = 2.5
     spare: int = 0
+    dense: bool = False
 
 
 @dataclass(frozen=True)
@@ -74,8 +77,11 @@ def fit_chart(
     net = net_at(coarse_places(chart.uv, request.coarse), request.coarse, chart.cuts, chart.uv)
     first = replace(request, points=request.points - request.spare)
     share = first.points / request.points
-    fitted = _refined(mesh, chart, net, first, Hold(), lambda done: report(share * done))
-    return fitted if chart.between is None else _mended(mesh, chart, fitted, request, report)
+    if chart.between is None:
+        return _refined(mesh, chart, net, first, Hold(), lambda done: report(share * done))
+    within = _with_samples(chart, chart.between.take(~chart.between.folded)) if request.dense else chart
+    fitted = _refined(mesh, within, net, first, Hold(), lambda done: report(share * done))
+    return _mended(mesh, chart, within, _on(mesh, chart, fitted), request, report)
 
 
 @dataclass(frozen=True)
@@ -113,10 +119,13 @@ def _refined(
 
 
 def _mended(
-    mesh: FitMesh, chart: Chart, fitted: Fitted, request: FitRequest, report: Callable[[float], None]
+    mesh: FitMesh, chart: Chart, within: Chart, fitted: Fitted, request: FitRequest, report: Callable[[float], None]
 ) -> Fitted:  # fmt: skip
-    """The fit without spikes between its samples; the errors that come with it are those of the chart's own samples."""
-    within, held = chart, np.zeros((0, 2))
+    """The fit without spikes between its samples; the errors that come with it are those of the chart's own samples.
+
+    within : the chart with the samples that it was fitted to.
+    """
+    held = np.zeros((0, 2))
     places, best, enough = places_of(chart, mesh), fitted, MAX_RMS_FACTOR * _rms(mesh, chart, fitted)
     count, most = len(places.uv) + 1, np.inf
     for factor in HOLD_WEIGHTS:

@@ -22,6 +22,7 @@ from surface.fit.transfer.align import Similarity, align, from_pairs
 from surface.fit.transfer.colours import with_colours
 from surface.fit.transfer.detail.hidden import in_sight
 from surface.fit.transfer.faults import HINT, faults_of_transfer
+from surface.fit.transfer.lashes import rooted_lashes
 from surface.fit.transfer.lids import close_lids
 from surface.fit.transfer.lining import keep_lining_behind
 from surface.fit.transfer.place_parts import scaled
@@ -116,14 +117,14 @@ def transfer(
     provenance = {**head.data.provenance, "made": f"omote fit: form of a scan, expressions of the head {head.name!r}"}
     warped = warp_head(head, template, done.warp, done.smooth, matcher, shown, provenance, name)
     progress("lids", 0.75)
-    data, mended = _with_lids_and_lining(warped, head.data)
+    data, mended = _with_lids_and_lining(warped, head)
     changed = reseated(warped, data)
     progress("report", 0.95)
     factor, notes = _true_size(found, options.unit, picked)
     notes += [*scan.notes, *mended]
     notes += ["the face is symmetric, and was fitted symmetrically"] if mirrored else []
     if scan.colours is not None:
-        data, colour_notes = with_colours(data, scan.colours)
+        data, colour_notes = with_colours(data, scan.colours, scan.eye_colours)
         notes += colour_notes
     parts = face_reports(data, template, done.warp, shown)
     registered = registration_errors(template, done, matcher, STAGES[-1].farthest)
@@ -154,10 +155,11 @@ def _registered(
     return samples, symmetrised(done) if mirrored else done
 
 
-def _with_lids_and_lining(warped: HeadData, source: HeadData) -> tuple[HeadData, list[str]]:
-    """The warped head with lids that close as those of its ``source``, and a mouth's lining behind the skin; notes."""
-    data, lid_notes = seat_drawn_lids(close_lids(warped, source))
-    data, lining_notes = keep_lining_behind(data)
+def _with_lids_and_lining(warped: HeadData, source: Head) -> tuple[HeadData, list[str]]:
+    """The warped head with lids that close as those of its ``source``, lashes that move with them, and a mouth's lining
+    behind the skin; notes."""
+    data, lid_notes = seat_drawn_lids(close_lids(warped, source.data))
+    data, lining_notes = keep_lining_behind(rooted_lashes(data, source))
     return data, [*lid_notes, *lining_notes]
 
 

@@ -14,7 +14,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats
-from surface.fit.eyes.colours import EYE_RANGE, SKIN_RANGE, USUAL_IRIS, by_rings
+from surface.fit.eyes.colours import EYE_RANGE, SKIN_RANGE, USUAL_IRIS, EyeColours, by_rings
+from surface.fit.eyes.names import is_cover, is_eye, is_iris
 from surface.fit.points.eyeball import IRIS
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.fit.source.textures import Samples, sample_colours
@@ -30,8 +31,10 @@ FRONT = 0.3  # least z of the normals of the vertices whose median colour is tha
 STRONG, LEAST = 0.6, 20  # strength of a layer at the vertices that give its colour; least number of such vertices
 SHOWN = 0.3  # least amount of a layer that its colour is computed with
 EYE_REACH = (0.93, 1.12)  # distance from an eyeball's centre, in radii, within which samples belong to the eyeball
+PIECE_REACH = 1.5  # greatest distance of samples of an eye's own piece, in radii
 WHITER = 0.75  # greatest saturation of the white of an eye, relative to that of the skin
 LEAST_EYE = 60  # least number of samples on an eye
+SIDES = ("left_eye", "right_eye")
 
 
 def scan_colours(raw: MeshData, kept: Bools | None = None) -> Samples | None:
@@ -55,13 +58,22 @@ def scan_colours(raw: MeshData, kept: Bools | None = None) -> Samples | None:
     return None if not len(rgb) or (grey and float(rgb.std(axis=0).max()) < PLAIN) else found
 
 
+def eye_faces(raw: MeshData, kept: Bools) -> Bools:
+    """(f,) which of the faces ``kept`` (f,) belong to eyes by name, less corneas and highlights."""
+    drawn = [is_eye(n) and (is_iris(n) or not is_cover(n)) for n in raw.pieces]
+    return kept & np.isin(raw.piece, np.flatnonzero(drawn))
+
+
 def moved(samples: Samples, turn: Floats, scale: float, shift: Floats) -> Samples:
     """The samples with every point p moved to scale * turn @ p + shift."""
     return replace(samples, points=scale * samples.points @ turn.T + shift)
 
 
-def with_colours(data: HeadData, samples: Samples) -> tuple[HeadData, list[str]]:
-    """A head that lies on a scan, painted with the scan's colours; and notes for the report on which were found."""
+def with_colours(data: HeadData, samples: Samples, eyes: Samples | None = None) -> tuple[HeadData, list[str]]:
+    """A head that lies on a scan, painted with the scan's colours; and notes for the report on which were found.
+
+    eyes : of the scan's pieces that are eyes; None where it has none, or one skin with the face.
+    """
     solid = samples.colour[:, 3] > 0.5
     tree, rgb = cKDTree(samples.points[solid]), np.sqrt(samples.colour[solid, :3])  # means of roots look right
     head = Head(data)
@@ -80,8 +92,8 @@ def with_colours(data: HeadData, samples: Samples) -> tuple[HeadData, list[str]]
                 part, own, skin, skin / np.maximum(old, 1e-3), *_looked_up(part.vertices.astype(float), tree, rgb)
             )
         layers += own
-    layers, eyes = _with_eyes(layers, data, samples, skin)
-    colours = [f"skin {_words(skin)}", *eyes]
+    layers, said = _with_eyes(layers, data, samples, skin) if eyes is None else _with_pieces(layers, data, eyes)
+    colours = [f"skin {_words(skin)}", *said]
     return replace(data, paint=layers), [f"colours taken from the scan (linear RGB): {'; '.join(colours)}"]
 
 
@@ -145,24 +157,54 @@ def _with_eyes(
 
     Closed eyes, whose samples are as red as skin, are left as they are.
     """
-    usual = USUAL_IRIS * float(np.linalg.norm(data.eyes[0] - data.eyes[1])) / data.eye_radius
     colours = []
-    for side, name in enumerate(("left_eye", "right_eye")):
+    for side in (0, 1):
         local = (samples.points - data.eyes[side]) / data.eye_radius
         off = np.linalg.norm(local, axis=1)
         own = (off > EYE_REACH[0]) & (off < EYE_REACH[1]) & (local[:, 2] > 0.0)
         if own.sum() < LEAST_EYE:
             continue
-        found = by_rings(Samples(samples.points[own], samples.colour[own], samples.weight[own]), data.eyes[side], usual)
-        if found.white is None or found.iris is None or _saturation(found.white) > WHITER * _saturation(skin):
-            continue
-        parts = [p.name for p in data.parts if p.follows == name]
-        values = {"iris": found.iris, "sclera": found.white}
-        values |= {"iris_radius": np.array([found.iris_radius])} if abs(found.iris_radius - IRIS) > 0.01 else {}
-        layers = [la for la in layers if not (la["part"] in parts and la["attribute"] in values)]
-        layers += [_all_over(part, key, np.clip(v, *EYE_RANGE)) for part in parts for key, v in values.items()]
-        colours.append(f"iris of the {name.replace('_', ' ')} {_words(found.iris)}")
+        found = _ringed(data, side, samples, own)
+        if found.white is not None and _saturation(found.white) <= WHITER * _saturation(skin):
+            layers, said = _coloured(layers, data, side, found)
+            colours += said
     return layers, colours
+
+
+def _with_pieces(layers: list[dict[str, Any]], data: HeadData, eyes: Samples) -> tuple[list[dict[str, Any]], list[str]]:
+    """The layers with the colours of eyes that are pieces of their own, and words for the report.
+
+    They may lie at another depth than the head's: a texture's iris is often set back behind a clear cornea.
+    """
+    near = np.linalg.norm(eyes.points[:, None] - data.eyes, axis=2)
+    colours = []
+    for side in (0, 1):
+        own = (near[:, side] < near[:, 1 - side]) & (near[:, side] < PIECE_REACH * data.eye_radius)
+        if own.sum() >= LEAST_EYE:
+            layers, said = _coloured(layers, data, side, _ringed(data, side, eyes, own))
+            colours += said
+    return layers, colours
+
+
+def _ringed(data: HeadData, side: int, samples: Samples, own: Bools) -> EyeColours:
+    """The colours of one eye, from those samples (m,) that are its ``own``."""
+    usual = USUAL_IRIS * float(np.linalg.norm(data.eyes[0] - data.eyes[1])) / data.eye_radius
+    return by_rings(Samples(samples.points[own], samples.colour[own], samples.weight[own]), data.eyes[side], usual)
+
+
+def _coloured(
+    layers: list[dict[str, Any]], data: HeadData, side: int, found: EyeColours
+) -> tuple[list[dict[str, Any]], list[str]]:  # fmt: skip
+    """The layers with one eye's colours, and words for the report; the same where no iris was found."""
+    if found.iris is None or found.white is None:
+        return layers, []
+    name = SIDES[side]
+    parts = [p.name for p in data.parts if p.follows == name]
+    values = {"iris": found.iris, "sclera": found.white}
+    values |= {"iris_radius": np.array([found.iris_radius])} if abs(found.iris_radius - IRIS) > 0.01 else {}
+    layers = [la for la in layers if not (la["part"] in parts and la["attribute"] in values)]
+    layers += [_all_over(part, key, np.clip(v, *EYE_RANGE)) for part in parts for key, v in values.items()]
+    return layers, [f"iris of the {name.replace('_', ' ')} {_words(found.iris)}"]
 
 
 def _saturation(colour: Floats) -> float:

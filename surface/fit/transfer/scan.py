@@ -16,7 +16,7 @@ from surface.fit.source.kinds import skin_and_eyes, worn_faces
 from surface.fit.source.load import fit_mesh_of, wanted_faces, worn_mesh
 from surface.fit.source.mesh import LARGE, SMALL, FitMesh, directed_edges, triangles
 from surface.fit.source.textures import Samples as Colours
-from surface.fit.transfer.colours import moved, scan_colours
+from surface.fit.transfer.colours import eye_faces, moved, scan_colours
 from surface.readers.gltf.mesh import read_gltf
 from surface.readers.meshdata import MAX_VERTICES, read_bytes
 from surface.readers.npzmesh import read_npz
@@ -36,7 +36,8 @@ class Scan:
     """Triangles of a bare mesh, in any unit and axes.
 
     vertices : (n, 3). triangles : (t, 3). original : (m,) int64, for each vertex of the file its row in ``vertices``.
-    colours : samples of its colours; None where it has none. notes : messages on what was left out of the file.
+    colours : samples of its colours; None where it has none. eye_colours : of those, the ones of pieces named as eyes.
+    notes : messages on what was left out of the file.
     worn : hair, hats and glasses that a head keeps as they are, in the file's coordinates; None without any.
     """
 
@@ -44,13 +45,14 @@ class Scan:
     triangles: Ints
     original: Ints
     colours: Colours | None = None
+    eye_colours: Colours | None = None
     notes: tuple[str, ...] = ()
     worn: FitMesh | None = None
 
     def turned(self, turn: Floats, scale: float, shift: Floats) -> Scan:
         """The scan with every vertex p moved to scale * turn @ p + shift."""
-        colours = None if self.colours is None else moved(self.colours, turn, scale, shift)
-        return replace(self, vertices=scale * self.vertices @ turn.T + shift, colours=colours)
+        colours, eyes = (None if c is None else moved(c, turn, scale, shift) for c in (self.colours, self.eye_colours))
+        return replace(self, vertices=scale * self.vertices @ turn.T + shift, colours=colours, eye_colours=eyes)
 
     def kept(self, faces: Bools) -> Scan:
         """The scan with only the triangles that a mask (t,) chooses."""
@@ -89,7 +91,8 @@ def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
         kept, notes = skin_and_eyes(raw, wanted & ~aside)
         scan = make_scan(raw.vertices, triangles(raw.faces[kept]), str(path))
         worn, damage = worn_mesh(still, aside, str(path))
-        return replace(scan, colours=scan_colours(raw, kept), notes=(*notes, *damage), worn=worn)
+        colours, eyes = scan_colours(raw, kept), scan_colours(raw, eye_faces(raw, kept))
+        return replace(scan, colours=colours, eye_colours=eyes, notes=(*notes, *damage), worn=worn)
     if kind not in OTHERS:
         raise FitError(f"{path}: {kind or 'a file without suffix'} is no mesh that can be read",
                        hint=f"export it as {', '.join([*OWN, *OTHERS])}")  # fmt: skip

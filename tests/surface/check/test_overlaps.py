@@ -108,6 +108,19 @@ def test_skin_that_nobody_sees_at_rest_may_overlap_teeth() -> None:
     assert measured(hull, lining, inside) == {}
 
 
+def test_flesh_ends_at_what_lines_the_mouth() -> None:
+    """A lip that reaches a millimetre into the other, up to the other's lining, is no deeper in it than that."""
+    deep = measured(skin(), ball(6.0, material="skin"))["skin"].mm
+    points, triangles = plain.sheet((-20, 20), (-80, -40), 2.0)
+    above = plain.part("above", points + np.array([0.0, 0.0, 1.0]), triangles, material="mouth")  # within the ball
+    below = plain.part(
+        "below", points - np.array([0.0, 0.0, 1.0]), triangles[:, ::-1], material="mouth"
+    )  # of the sheet
+    shallow = measured(skin(), ball(6.0, material="skin"), above, below)["skin"].mm
+    assert deep > 3.0 and 0.6 < shallow < 2.1
+    assert measured(skin(), above, below) == {}
+
+
 def test_a_note_says_what_is_deeper_than_a_millimetre(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "Head", lambda data: data)
     monkeypatch.setattr(module, "find_mouth", lambda subject: None)

@@ -146,6 +146,16 @@ def test_a_spike_is_steeper_than_half_of_the_rings_radius(height: float, named: 
         assert 3.4 < float(text.split()[5]) <= height + 0.05
 
 
+def test_a_spike_that_nobody_sees_is_none_and_hair_hides_nothing() -> None:
+    """As the end of the bag that lines the mouth of a head without shapes."""
+    points, triangles, normals = plain.ball((0.0, 0.0, 0.0), 300.0)
+    hull = plain.part("hull", points, triangles, normals=normals)
+    hair = plain.part("hull", points, triangles, normals=normals, material="hair")
+    spike = cone(30, 30, 12.0)
+    assert len(texts(spike)) == len(texts(spike, hair)) == 1
+    assert texts(spike, hull) == []
+
+
 def test_a_spike_on_a_head_of_twice_the_size_is_twice_as_high() -> None:
     points, triangles = plain.sheet((-120, 120), (-180, 120), 4.0)
     for height, named in ((6.0, 0), (7.2, 1)):

@@ -35,6 +35,7 @@ def cut_bust(mesh: FitMesh, eyes_at: Floats, scale: float) -> tuple[FitMesh, lis
         return mesh, []
     outside = _whole_outline(mesh, eyes_at, scale)
     gone = _body_objects(mesh, outside) & ~_necks(mesh, outside, eyes_at[1] + NECK * scale)
+    gone &= ~_heads(mesh, outside, gone, eyes_at[1])
     notes = _notes(mesh, gone, -low)
     return _compact(cut(_subset(mesh, _kept_faces(mesh, gone)), outside)), notes
 
@@ -93,11 +94,23 @@ def _body_objects(mesh: FitMesh, outside: Floats) -> Bools:
 def _necks(mesh: FitMesh, outside: Floats, height: float) -> Bools:
     """(objects,) which objects are skin, by name, and reach up to a height inside the outline: they hold the neck of a
     head that ends at the chin, and are cut like a body of one piece with its head."""
-    skin = _named_skin(mesh)
+    return _named_skin(mesh) & (_tops(mesh, outside) > height)
+
+
+def _heads(mesh: FitMesh, outside: Floats, gone: Bools, height: float) -> Bools:
+    """(objects,) which objects hold a head and its body in one: they reach above a height, the eyes', and no word says
+    that they are anything but skin. None where another such object is not ``gone``: that one is the head."""
+    skin = np.array([kind_of(n).name == SKIN for n in mesh.pieces], bool)
+    held: Bools = skin & (_tops(mesh, outside) > height)
+    return held if not (held & ~gone).any() else np.zeros(len(held), bool)
+
+
+def _tops(mesh: FitMesh, outside: Floats) -> Floats:
+    """(objects,) how high each object reaches inside the outline, y in mm."""
     first = mesh.faces[:, 0]
     most = np.full(len(mesh.pieces), -np.inf)
     np.maximum.at(most, mesh.piece, np.where(outside[first] < 0, mesh.vertices[first, 1], -np.inf))
-    return skin & (most > height)
+    return most
 
 
 def _named_skin(mesh: FitMesh) -> Bools:

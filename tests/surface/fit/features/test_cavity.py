@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bag_head import bag, sphere
 
-from surface.fit.features.cavity import POINTS, SPARE, line_mouth
+from surface.fit.features.cavity import CHORD_MM, POINTS, SPARE, line_mouth
 from surface.fit.features.generic import make_plan
 from surface.fit.source import regions
 from surface.fit.source.islands import Island
@@ -80,6 +80,8 @@ def test_a_plan_has_the_lining_as_a_cavity_with_the_look_of_a_mouth() -> None:
     )
     assert next(iter(parts)) == "face"
     assert parts["cavity"][0].request.points == POINTS + SPARE and parts["cavity"][0].request.spare == SPARE > 0
+    assert parts["cavity"][0].request.dense and not parts["face"][0].request.dense
+    assert parts["cavity"][0].budget[1] == pytest.approx(CHORD_MM / 0.24 * parts["face"][0].budget[1])
     vertices = np.concatenate([i.vertex for i in parts["cavity"][1]])
     assert (vertices >= OUTER).mean() > 0.7
     faces = np.concatenate([i.vertex for i in parts["face"][1]])

@@ -85,14 +85,31 @@ def test_the_rms_of_a_fit_leaves_folds_out(fitted):
     assert refine._rms(mesh, own, other) == pytest.approx(np.sqrt((kept**2).mean()))
 
 
-def test_a_net_of_more_points_than_samples_is_mended_between_them():
-    """Coarse samples are met by any number of points; what stands between them must not."""
+def rough_sheet() -> FitMesh:
+    """A coarse mesh, 7 by 7 vertices, whose heights say nothing of each other."""
     x, y = np.meshgrid(np.linspace(-50.0, 50.0, 7), np.linspace(-50.0, 50.0, 7))
     rough = np.random.default_rng(4).uniform(-8.0, 8.0, x.size)
     at = np.column_stack([x.ravel(), y.ravel(), rough])
     rows = np.arange(49).reshape(7, 7)
     faces = np.stack([rows[:-1, :-1], rows[:-1, 1:], rows[1:, 1:], rows[1:, :-1]], axis=-1).reshape(-1, 4)
-    mesh = FitMesh(at, faces, at[:, :2] / 100.0 + 0.5, faces.copy(), (), np.zeros((0, 49, 3)))
+    return FitMesh(at, faces, at[:, :2] / 100.0 + 0.5, faces.copy(), (), np.zeros((0, 49, 3)))
+
+
+def test_a_dense_fit_follows_a_coarse_mesh_between_its_samples_and_is_measured_at_these():
+    mesh = rough_sheet()
+    chart = make_chart(mesh, find_islands(mesh), downweight_slivers=True)
+    request = FitRequest(300, coarse=0.1, finest=0.3, neutral_mm=0.2, astray_mm=20.0)
+    for folded in (False, True):  # folded places are held only loosely: they are no samples
+        own = replace(chart, between=replace(chart.between, folded=np.full_like(chart.between.folded, folded)))
+        fits = [fit_chart(mesh, own, replace(request, dense=dense)) for dense in (False, True)]
+        plain, dense = (rms(dense_errors(mesh, chart, f.net, f.points, f.moves).neutral) for f in fits)
+        assert dense < (0.6 if not folded else 1.01) * plain and dense > (0.99 * plain if folded else 0.0)
+        assert all(f.error.shape == (len(chart.uv),) for f in fits)
+
+
+def test_a_net_of_more_points_than_samples_is_mended_between_them():
+    """Coarse samples are met by any number of points; what stands between them must not."""
+    mesh = rough_sheet()
     chart = make_chart(mesh, find_islands(mesh), downweight_slivers=True)
     request = FitRequest(300, coarse=0.1, finest=0.3, neutral_mm=0.2, astray_mm=2.5)
     first = refine._refined(

@@ -118,6 +118,33 @@ def test_open_eyes_keep_their_colours_and_closed_ones_tell_none(data):
             np.testing.assert_allclose(layer["value"], IRIS, atol=0.01)
 
 
+def test_eyes_of_their_own_tell_their_colours_behind_lids_and_however_deep_they_lie(data):
+    """Before an iris that is set back behind a cornea, lids are what lies as far out as an eyeball."""
+    skin = samples_on(data, lambda u, v: SKIN)
+    lids, balls = ([ball(data, side, *two) for side in (0, 1)] for two in ((SKIN, SKIN), (IRIS, WHITE)))
+    every = [skin.points, *(at for at, _ in lids)], [skin.colour[:, :3], *(c for _, c in lids)]
+    deep = [data.eyes[side] + 0.8 * (at - data.eyes[side]) for side, (at, _) in enumerate(balls)]
+    seen, eyes = (
+        Samples(np.vstack(at), np.insert(np.vstack(rgb), 3, 1.0, axis=1), np.ones(sum(map(len, at))))
+        for at, rgb in (every, (deep, [c for _, c in balls]))
+    )
+    assert with_colours(data, seen)[1][0].count("iris") == 0
+    made, told = with_colours(data, seen, eyes)
+    assert told[0].count("iris of the ") == 2
+    parts = [p.name for p in data.parts if p.follows in ("left_eye", "right_eye")]
+    for attribute, colour in (("iris", IRIS), ("sclera", WHITE)):
+        painted = [la["value"] for la in made.paint if la["part"] in parts and la["attribute"] == attribute]
+        np.testing.assert_allclose(painted, [colour, colour], atol=0.01)
+    far = replace(eyes, points=eyes.points + 3.0 * data.eye_radius)
+    assert with_colours(data, seen, far)[1][0].count("iris") == 0
+
+
+def test_faces_of_eyes_are_those_of_eyeballs_and_irises_by_name():
+    raw = replace(quads(), piece=np.arange(4), pieces=("skin", "high-poly", "cornea", "iris"))
+    assert colours.eye_faces(raw, np.ones(4, bool)).tolist() == [False, True, False, True]
+    assert colours.eye_faces(raw, np.array([True, False, True, True])).tolist() == [False, False, False, True]
+
+
 def test_a_colour_is_the_mean_of_roots_of_six_samples_within_2_mm():
     points = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1.9, 0], [0, 0, 2.1], [50, 0, 0]])
     rgb = np.sqrt(np.array([[0.04, 0.0, 0.0], [0.16, 0.0, 0.0], [0.64, 0.0, 0.0], [1.0, 1.0, 1.0], [0.0, 1.0, 0.0]]))

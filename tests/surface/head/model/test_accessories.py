@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import random
 from dataclasses import fields, replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from surface.base.errors import HeadFileError
 from surface.head import Head, save_data
 from surface.head.model.accessories import FILE, Accessory, fault_of, read_accessories, write_accessories
 from surface.head.model.sidecar import FORMAT
+from tests.fuzz.mutators import mutate
 
 
 def test_all_of_them_come_back(tmp_path: Path) -> None:
@@ -45,6 +47,7 @@ def test_a_head_wears_what_lies_beside_it(tmp_path: Path) -> None:
     assert worn.accessory.name == "Card" and worn.pivot == (0.0, -50.0, 0.0)
 
 
+MUTATIONS = 150
 DAMAGE = {
     "names": np.array([1, 2]), "kinds": np.array(["boots"]), "alphas": np.array(["OPAQUE", "MASK"]),
     "colours": np.ones((1, 3), np.float32), "cutoffs": np.array([np.nan], np.float32),
@@ -111,6 +114,21 @@ def test_a_file_that_is_cut_short_is_refused(tmp_path: Path) -> None:
     path.write_bytes(path.read_bytes()[:400])
     with pytest.raises(HeadFileError, match=r"accessories\.npz"):
         Head.load(tmp_path)
+
+
+def test_files_with_seeded_damage_are_read_or_refused_in_plain_words(tmp_path: Path) -> None:
+    """``make fuzz`` reads more of them, as whole heads."""
+    path = write_accessories(tmp_path, [card(), replace(card(), name="Band", texture=b"")])
+    assert path is not None
+    sound, refused = path.read_bytes(), 0
+    for seed in range(MUTATIONS):
+        path.write_bytes(mutate(sound, random.Random(seed)))
+        try:
+            read_accessories(tmp_path)
+        except HeadFileError as error:
+            refused += 1
+            assert str(error).startswith(f"{path}: ") and error.hint and "\n" not in str(error)
+    assert MUTATIONS // 2 < refused < MUTATIONS
 
 
 def test_a_texture_repeats_only_where_its_coordinates_leave_it() -> None:

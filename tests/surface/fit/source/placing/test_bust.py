@@ -87,6 +87,30 @@ def test_skin_that_reaches_up_to_the_neck_is_cut_like_the_head_and_not_left_out(
         assert at[:, 1].max() > top + 36.0 and at[:, 1].min() > -196
 
 
+@pytest.mark.parametrize(("name", "kept"), [("model", True), ("Hood", False)])
+def test_a_body_in_one_piece_with_its_head_stays_beside_eyes_of_their_own(name, kept):
+    """As MakeHuman exports persons: most of the skin is that of the body, and only the eyes are pieces apart."""
+    rest = body()
+    eyes = np.isin(rest.piece, [k for k, n in enumerate(rest.pieces) if n.startswith("Eye")])
+    assert eyes.any() and not eyes.all()
+    pieces = (name, *(f"high-poly{side}" for side in (0, 1)))
+    still = replace(rest, names=(), deltas=rest.deltas[:0], pieces=pieces, piece=np.where(eyes, 1, 0))
+    mesh, (note,) = cut_bust(still, EYES_AT, 1.0)
+    assert (mesh.piece == 0).any() == kept and (f"'{name}'" in note) != kept and (mesh.piece == 1).any()
+    assert mesh.vertices[:, 1].min() > -196
+
+
+def test_a_head_of_its_own_is_kept_without_what_else_reaches_above_the_eyes():
+    mesh = replace(
+        quad(), pieces=("abc", "robe"), faces=np.array([[3, 0, 1, -1], [3, 1, 4, -1]]), piece=np.array([0, 1])
+    )
+    inside, top = -np.ones(6), mesh.vertices[3, 1]
+    for gone, held in ((np.array([True, True]), [True, True]), (np.array([False, True]), [False, False])):
+        assert bust._heads(replace(mesh, pieces=("abc", "def")), inside, gone, top - 0.01).tolist() == held
+    assert bust._heads(mesh, inside, np.array([True, True]), top).tolist() == [False, False]
+    assert bust._heads(mesh, inside, np.array([True, True]), top - 0.01).tolist() == [True, False]  # clothes are none
+
+
 def test_a_bust_is_no_body():
     mesh, notes = cut_bust(HEAD, EYES_AT, 1.0)
     assert mesh is HEAD and notes == []
