@@ -71,7 +71,8 @@ def test_what_drives_a_head_needs_no_scipy(tmp_path: Path) -> None:
         ("run", "stage.toml", "--dry-run", "--seconds", "0.2"),
         ("play", "a.tsv", "--stage", "stage.toml", "--dry-run"),
         ("run", "anchors.toml", "--no-face", "--seconds", "0.2"),
-        ("simulate", "robot", "--help"), ("export", "head.obj", "--head", "small"), ("check", "small"),
+        ("simulate", "robot", "--help"), ("render", "-o", "face.png", "--size", "64x64"),
+        ("export", "head.obj", "--head", "small"), ("check", "small"),
     )  # fmt: skip
     *results, checked = without(["scipy"], *commands, cwd=tmp_path)
     assert [(words, code) for words, code, *_ in results if code] == [], results
