@@ -80,6 +80,12 @@ def test_what_drives_a_head_needs_no_scipy(tmp_path: Path) -> None:
     assert checked[1] == 1 and "small: missing eye: " in checked[3] and "scipy" not in checked[3]
 
 
+def test_pictures_are_imported_before_what_writes_them(tmp_path: Path) -> None:
+    code = "import sys, surface.view; print(*{'PIL', 'moderngl', 'imgui_bundle', 'scipy.sparse'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=240, check=True)
+    assert done.stdout.strip() == ""
+
+
 def test_what_needs_scipy_names_the_extra(tmp_path: Path) -> None:
     commands = ("fit", "me.glb", "-o", "me"), ("bench", "surface")
     for words, code, _, said in without(["scipy"], *commands, cwd=tmp_path):

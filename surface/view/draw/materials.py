@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from surface.base.arrays import median
 from surface.view.draw.programs import build
 from surface.view.draw.tooth_necks import tooth_necks
 from surface.view.scene.openings import LID_POINTS, Openings
@@ -245,7 +246,7 @@ def _necked(part: ViewPart) -> np.ndarray:
 
 def _grooved(part: ViewPart) -> np.ndarray:
     """(m, 2): occlusion of a tongue, with a furrow along the middle of its upper side, and no gum."""
-    across = np.asarray(part.vertices[:, 0]) - np.median(part.vertices[:, 0])
+    across = np.asarray(part.vertices[:, 0]) - median(part.vertices[:, 0])
     furrow = np.exp(-((across / _GROOVE_MM) ** 2)) * np.clip(part.normals[:, 1], 0.0, 1.0)
     shade = _bare(part)
     shade[:, 0] *= 1.0 - _GROOVE * furrow
