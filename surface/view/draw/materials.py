@@ -43,6 +43,9 @@ _BAR = (2.2, -2.6, 0.08, 0.0)
 _NO_ROOTS_MM = 1e3
 #: Materials of parts that the skin surrounds in every pose.
 INSIDE = ("eye", "teeth", "gums", "mouth")
+#: Of these, those that closed lips hide: a tongue may reach out between them, and the mouth's lining is seen where a
+#: pixel between two lips shows neither.
+BEHIND_LIPS = ("teeth", "gums")
 #: Programs of what is worn.
 WORN = ("strand", "cloth")
 #: Attributes of skin that are drawn by pixel, with quality "full": freckles, and the edge of the lips.
