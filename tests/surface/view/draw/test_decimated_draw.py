@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from surface.head import Head
+from surface.head.model.look import Look
 from surface.view import THEMES, Camera, Offscreen
 from surface.view.draw import decimated_draw, materials
 from surface.view.draw.decimated_draw import DrawCall, JoinedParts
@@ -179,3 +180,17 @@ def test_one_draw_call_owns_the_buffers_also_where_clothes_hide_its_parts(monkey
     assert len(made) == 1
     assert [call._owner for call in calls] == [True, False, False]
     assert [len(call.triangles) for call in calls] == [0, 4, 6]
+
+
+@pytest.mark.slow
+def test_freckles_of_live_pictures_are_about_as_many_as_those_of_stills(gl: None, root: Path) -> None:
+    darker = {}
+    for freckles in (0.0, 0.9):
+        freckled = Head.load(root / "configs" / "heads" / "ict", look=Look(freckles=freckles))
+        for samples in (None, 1):  # None: live, and drawn in software with fewer triangles and without filters
+            with Offscreen(freckled, (960, 720), samples=samples) as made:
+                made.draw(np.zeros(len(freckled.parameters)), Camera.front())
+                darker[freckles, samples] = made.read()[250:480, 280:680].astype(float)
+    live, still = ((darker[0.0, samples] - darker[0.9, samples]).mean() for samples in (None, 1))
+    assert 0.02 < still < 2.0, "freckles are few and seen"
+    assert 0.5 < live / still < 2.0
