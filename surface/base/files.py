@@ -225,7 +225,7 @@ def _check_size(archive: zipfile.ZipFile, limit: int) -> None:
         raise ValueError(f"unpacks to {size >> 20} MB, more than {limit >> 20} MB")
 
 
-def _array(data: bytes) -> NDArray[Any] | bytes:
+def _array(data: bytes) -> Any:
     """Return the array of a member of an archive, or its bytes where it holds none.
 
     Numbers in the usual form of header are read here, in half of the time that numpy takes for a head's hundreds of
@@ -236,7 +236,6 @@ def _array(data: bytes) -> NDArray[Any] | bytes:
     end = _PREFIX + int.from_bytes(data[_PREFIX - 2 : _PREFIX], "little")
     header = _HEADER.fullmatch(data, _PREFIX, end) if data[6:8] == b"\1\0" else None
     if header is None:
-        array: NDArray[Any] = np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
-        return array
+        return np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
     kind, shape = np.dtype(header[1].decode()), tuple(int(length) for length in header[2].split(b",") if length)
     return np.frombuffer(data, kind, math.prod(shape), end).reshape(shape).copy()
