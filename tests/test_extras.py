@@ -71,12 +71,19 @@ def test_what_drives_a_head_needs_no_scipy(tmp_path: Path) -> None:
         ("run", "stage.toml", "--dry-run", "--seconds", "0.2"),
         ("play", "a.tsv", "--stage", "stage.toml", "--dry-run"),
         ("run", "anchors.toml", "--no-face", "--seconds", "0.2"),
-        ("simulate", "robot", "--help"), ("export", "head.obj", "--head", "small"), ("check", "small"),
+        ("simulate", "robot", "--help"), ("render", "-o", "face.png", "--size", "64x64"),
+        ("export", "head.obj", "--head", "small"), ("check", "small"),
     )  # fmt: skip
     *results, checked = without(["scipy"], *commands, cwd=tmp_path)
     assert [(words, code) for words, code, *_ in results if code] == [], results
     assert len(results) == len(commands) - 1
     assert checked[1] == 1 and "small: missing eye: " in checked[3] and "scipy" not in checked[3]
+
+
+def test_pictures_are_imported_before_what_writes_them(tmp_path: Path) -> None:
+    code = "import sys, surface.view; print(*{'PIL', 'moderngl', 'imgui_bundle', 'scipy.sparse'} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=240, check=True)
+    assert done.stdout.strip() == ""
 
 
 def test_what_needs_scipy_names_the_extra(tmp_path: Path) -> None:

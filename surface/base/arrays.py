@@ -1,4 +1,4 @@
-"""Names of array types that every room uses."""
+"""Names of array types that every room uses, and the median."""
 
 from __future__ import annotations
 
@@ -13,3 +13,10 @@ Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 Array = NDArray[Any]
 """Of any dtype, as files hold them."""
+
+
+def median(values: Floats | Floats32) -> float:
+    """Return the median of some numbers (n,), as numpy's function does; that one imports numpy's masked arrays, which
+    takes longer than anything that a start needs it for."""
+    middle = np.sort(values)[(len(values) - 1) // 2 : len(values) // 2 + 1]
+    return float(middle.mean())

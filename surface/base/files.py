@@ -9,8 +9,11 @@ file it was and what to do.
 from __future__ import annotations
 
 import errno
+import io
 import json
+import math
 import os
+import re
 import stat
 import struct
 import sys
@@ -43,6 +46,10 @@ DAMAGED = (
 """What numpy and zipfile raise for damaged archives."""
 
 _CHUNK = 1 << 20
+_PREFIX = 10  # bytes of an array in a file before its header: numpy's magic, version, the header's length
+_HEADER = re.compile(
+    rb"\{'descr': '([<|][bifu][1248])', 'fortran_order': False, 'shape': \((\d{0,12},?(?: \d{1,12},?)*)\), \} *\n"
+)
 _KINDS = {
     stat.S_ISDIR: "is a folder, not a file",
     stat.S_ISFIFO: "is a named pipe, not a file",
@@ -187,9 +194,9 @@ def read_npz(path: str | os.PathLike[str], limit: int = DATA_LIMIT) -> dict[str,
     """
     with open_file(path, limit) as file:
         try:
-            _check_archive(file, limit)
-            with np.load(file, allow_pickle=False) as stored:
-                found = {name: stored[name] for name in stored.files}
+            with zipfile.ZipFile(file) as archive:
+                _check_size(archive, limit)
+                found = {entry.filename.removesuffix(".npy"): _array(archive.read(entry)) for entry in archive.filelist}
         except DAMAGED as error:
             if "allow_pickle" in str(error):  # numpy's words for what is no archive name an option of its own
                 raise ValueError("holds Python objects, which omote does not load") from error
@@ -211,10 +218,24 @@ def _is_text(array: NDArray[Any]) -> bool:
     return bool(((points < 0xD800) | ((points > 0xDFFF) & (points <= sys.maxunicode))).all())
 
 
-def _check_archive(file: IO[bytes], limit: int) -> None:
+def _check_size(archive: zipfile.ZipFile, limit: int) -> None:
     """Refuse an archive whose declared unpacked size exceeds `limit`; zipfile enforces the declared sizes."""
-    with zipfile.ZipFile(file) as archive:
-        size = sum(entry.file_size for entry in archive.infolist())
+    size = sum(entry.file_size for entry in archive.filelist)
     if size > limit:
         raise ValueError(f"unpacks to {size >> 20} MB, more than {limit >> 20} MB")
-    file.seek(0)
+
+
+def _array(data: bytes) -> Any:
+    """Return the array of a member of an archive, or its bytes where it holds none.
+
+    Numbers in the usual form of header are read here, in half of the time that numpy takes for a head's hundreds of
+    small arrays: it parses each header as Python. All else is numpy's to read.
+    """
+    if not data.startswith(np.lib.format.MAGIC_PREFIX):
+        return data
+    end = _PREFIX + int.from_bytes(data[_PREFIX - 2 : _PREFIX], "little")
+    header = _HEADER.fullmatch(data, _PREFIX, end) if data[6:8] == b"\1\0" else None
+    if header is None:
+        return np.lib.format.read_array(io.BytesIO(data), allow_pickle=False)
+    kind, shape = np.dtype(header[1].decode()), tuple(int(length) for length in header[2].split(b",") if length)
+    return np.frombuffer(data, kind, math.prod(shape), end).reshape(shape).copy()

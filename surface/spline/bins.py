@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Floats, Ints, median
 
 
 @dataclass(frozen=True)
@@ -49,5 +49,5 @@ def _axis(knots: Floats) -> tuple[float, float, int]:
     low, high = float(knots[:, 0].min()), float(knots[:, -1].max())
     if high <= low:
         high = low + 1.0
-    support = max(float(np.median(knots[:, -1] - knots[:, 0])), (high - low) / 1024)
+    support = max(median(knots[:, -1] - knots[:, 0]), (high - low) / 1024)
     return low, high, int(np.clip(6.0 * (high - low) / support, 1, 1024))

@@ -94,6 +94,11 @@ class DecimatedHead:
         self._seams.close(self.vertices, self.normals)
 
     @property
+    def lips_closed(self) -> bool:
+        """Whether lips touch all along their opening in the last pose, so that they hide teeth and gums."""
+        return self._rig.lips_closed
+
+    @property
     def turn(self) -> Floats:
         """(3, 3) the head's rotation of the last pose."""
         return np.eye(3) if self._turn is None else self._turn.matrix
@@ -109,7 +114,10 @@ class JoinedRig(SkinRig):
     Attributes
     ----------
     rows : slices of the points, by part.
+    lips_closed : whether lips touch all along their opening in the last pose; False for parts without lips.
     """
+
+    lips_closed = False
 
     def __init__(self, parts: Sequence[SkinPart], head: HeadData) -> None:
         of = {part.name: part for part in head.parts}
@@ -136,6 +144,8 @@ class JoinedRig(SkinRig):
         super()._evaluate(pose, moved)
         for rig, rows in self._rigs:
             rig.apply_contacts(pose, self.points[rows])
+        lips = [solver for rig, _ in self._rigs for solver in rig.lips]
+        self.lips_closed = bool(lips) and all(solver.gaps().max() <= 0.0 for solver in lips)
 
 
 def _join(parts: Sequence[PartData]) -> PartData:

@@ -103,6 +103,11 @@ class SkinRig:
         self._last_key, self._measured = (), False
         self.invalidations += 1
 
+    @property
+    def lips(self) -> list[ContactSolver]:
+        """Those of the part's own contacts that are lips."""
+        return [solver for solver in self._solvers if solver.contact.eye < 0]
+
     def apply_contacts(self, pose: Pose, points: Floats) -> None:
         """Correct control points (n, 3), moved by everything else, at the part's own contacts and at those it follows;
         corrections at its own are put into ``pose.pushes``."""

@@ -46,6 +46,10 @@ class DecimatedEvaluator(Evaluator):
     def rotation(self) -> np.ndarray:
         return self.decimated.turn
 
+    @property
+    def lips_closed(self) -> bool:
+        return self.decimated.lips_closed
+
 
 class JoinedParts:
     """Neighbouring parts of a decimated head that one program draws, as one part.

@@ -56,6 +56,11 @@ class Evaluator:
         """Rotation of the head, (3, 3)."""
         return np.asarray(getattr(self._head.parts[0], "turn", _IDENTITY))
 
+    @property
+    def lips_closed(self) -> bool:
+        """Whether lips are known to touch all along their opening, so that they hide teeth and gums."""
+        return False
+
     def release(self) -> None:
         """Release the graphics memory."""
 

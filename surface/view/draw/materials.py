@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from surface.base.arrays import median
 from surface.view.draw.programs import build
 from surface.view.draw.tooth_necks import tooth_necks
 from surface.view.scene.openings import LID_POINTS, Openings
@@ -42,6 +43,9 @@ _BAR = (2.2, -2.6, 0.08, 0.0)
 _NO_ROOTS_MM = 1e3
 #: Materials of parts that the skin surrounds in every pose.
 INSIDE = ("eye", "teeth", "gums", "mouth")
+#: Of these, those that closed lips hide: a tongue may reach out between them, and the mouth's lining is seen where a
+#: pixel between two lips shows neither.
+BEHIND_LIPS = ("teeth", "gums")
 #: Programs of what is worn.
 WORN = ("strand", "cloth")
 #: Attributes of skin that are drawn by pixel, with quality "full": freckles, and the edge of the lips.
@@ -245,7 +249,7 @@ def _necked(part: ViewPart) -> np.ndarray:
 
 def _grooved(part: ViewPart) -> np.ndarray:
     """(m, 2): occlusion of a tongue, with a furrow along the middle of its upper side, and no gum."""
-    across = np.asarray(part.vertices[:, 0]) - np.median(part.vertices[:, 0])
+    across = np.asarray(part.vertices[:, 0]) - median(part.vertices[:, 0])
     furrow = np.exp(-((across / _GROOVE_MM) ** 2)) * np.clip(part.normals[:, 1], 0.0, 1.0)
     shade = _bare(part)
     shade[:, 0] *= 1.0 - _GROOVE * furrow

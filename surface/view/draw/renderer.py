@@ -80,6 +80,7 @@ class Renderer:
         seen = [part for part in parts if len(part.triangles)]  # clothes may hide all of a part
         self._parts: list[PartBuffers] | list[DrawCall] = [self._buffers(part) for part in seen]
         self._simplified = False
+        self._lined = any(part.material == "mouth" for part in head.parts)
         self._camera: tuple[Camera, float] | None = None
         self._into_bust = False
         #: Grows with every upload: equal revisions, cameras and themes draw equal pictures.
@@ -176,14 +177,21 @@ class Renderer:
         if self._accessories is not None:
             self._accessories.turn(self.evaluator.rotation())
             self._accessories.draw_solid(multisampled=target.samples > 1)
+        hidden = materials.BEHIND_LIPS if self._lips_hide() else ()
         for buffers in self._parts:
-            self._draw_part(buffers, multisampled=target.samples > 1)
+            if buffers.part.material not in hidden:
+                self._draw_part(buffers, multisampled=target.samples > 1)
         self.ctx.enable_only(self.ctx.DEPTH_TEST)
         theme = self.theme
         set_uniforms(self._programs["background"], {"top": theme.background_top, "bottom": theme.background_bottom})
         self._background.render(corners((bands or Bands.whole(target.size)).boxes(), target.size))
         if self._accessories is not None:
             self._accessories.draw_blended(target)
+
+    def _lips_hide(self) -> bool:
+        """Whether nothing of :data:`materials.BEHIND_LIPS` is seen from the present camera. From below, the bust is
+        open; a display in place of the mouth is a line of light where lips touch."""
+        return self.evaluator.lips_closed and self._lined and not self._into_bust and not self.theme.lit
 
     def region(self, camera: Camera, size: tuple[int, int]) -> Bands:
         """The pixels of a picture of `size` that the head, as posed now, can cover."""

@@ -14,25 +14,20 @@ from surface.mesh.mesh import border_edges
 _NECK_MM = 0.4, 1.8  # from the border of a crown: as far as it is all gum, and where the tooth begins
 _LOW = 0.55  # share of a crown's height, from its tip, above which a border is where crowns touch, not the gum
 _SAME_MM = 1e-3  # vertices that are closer are one
+_MAX_PAIRS = 1 << 16  # of a vertex and a vertex of the border, that are compared at a time
 
 
 def tooth_necks(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) -> NDArray[np.float32]:
     """Return (m,) float32: how much gum covers each vertex (m, 3), mm, of teeth; 0 all over teeth without a border."""
-    from scipy.sparse import coo_matrix  # imported lazily: only teeth need it
-    from scipy.sparse.csgraph import connected_components  # imported lazily: only teeth need it
-
     if not len(triangles):
         return np.zeros(len(vertices), np.float32)
     places, same = np.unique(np.round(vertices / _SAME_MM).astype(np.int64), axis=0, return_inverse=True)
     same = same.ravel()
     welded = same[triangles]
     welded = welded[(welded != np.roll(welded, 1, axis=1)).all(axis=1)].astype(np.int32)
-    edges = border_edges(welded)
-    ends = np.concatenate([welded[:, :2], welded[:, 1:]])
-    graph = coo_matrix((np.ones(len(ends)), ends.T), shape=(len(places), len(places)))
-    tooth = connected_components(graph, directed=False)[1]
+    tooth = _connected(welded, len(places))
     border = np.zeros(len(places), bool)
-    border[edges.ravel()] = True
+    border[border_edges(welded).ravel()] = True
     at = np.asarray(places * _SAME_MM, np.float64)
     out = np.zeros(len(places))
     for k in np.unique(tooth[border]):
@@ -43,8 +38,6 @@ def tooth_necks(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) -
 
 def _covered(at: NDArray[np.float64], border: NDArray[np.bool_]) -> NDArray[np.float64]:
     """(n,) share of gum at vertices (n, 3) of one crown, of which those of ``border`` : (n,) lie on its border."""
-    from scipy.spatial import cKDTree  # imported lazily: only teeth need it
-
     along = at[border].mean(axis=0) - at.mean(axis=0)
     height = at @ along
     span = float(np.ptp(height))
@@ -53,7 +46,31 @@ def _covered(at: NDArray[np.float64], border: NDArray[np.bool_]) -> NDArray[np.f
     low = border & (height - height.min() > _LOW * span)
     if not low.any():
         return np.zeros(len(at))
-    away = cKDTree(at[low]).query(at)[0]
+    away = _distances(at, at[low])
     share = np.clip((_NECK_MM[1] - away) / (_NECK_MM[1] - _NECK_MM[0]), 0.0, 1.0)
     faded: NDArray[np.float64] = share * share * (3.0 - 2.0 * share)
     return faded
+
+
+# Both are short here: to import the same from scipy takes longer than all else that is done before the first picture is
+# drawn, and pictures are drawn where scipy is not installed, too.
+def _connected(triangles: NDArray[np.integer], count: int) -> NDArray[np.intp]:
+    """Return (count,) the least vertex of the component of triangles (t, 3) that each vertex belongs to."""
+    label = np.arange(count)
+    one, other = np.concatenate([triangles[:, :2], triangles[:, 1:]]).T
+    while (label[one] != label[other]).any():
+        low = np.minimum(label[one], label[other])
+        for end in (one, other):
+            np.minimum.at(label, label[end], low)
+        while (label != label[label]).any():
+            label = label[label]
+    return label
+
+
+def _distances(points: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return (n,) the distance of each point (n, 3) from the nearest of some places (m, 3)."""
+    least = np.full(len(points), np.inf)
+    for some in np.array_split(places, -(-len(places) * len(points) // _MAX_PAIRS)):
+        least = np.minimum(least, ((points[:, None] - some) ** 2).sum(axis=2).min(axis=1))
+    distances: NDArray[np.float64] = np.sqrt(least)
+    return distances

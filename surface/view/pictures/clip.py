@@ -8,14 +8,16 @@ from collections.abc import Iterable, Iterator
 from contextlib import suppress
 from itertools import chain, count
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from PIL.Image import Image
 
 from surface.base import ffmpeg
 from surface.base.errors import ViewError
 from surface.view.pictures.imagefile import as_image, replacing
+
+if TYPE_CHECKING:
+    from PIL.Image import Image  # imported lazily: few runs write pictures
 
 SUFFIXES = (".webp", ".gif", ".mp4")
 _FPS = 0.01, 1000.0

@@ -186,6 +186,25 @@ def test_a_damaged_name_in_an_archive_is_told_without_the_words_of_the_interpret
         files.read_npz(path)
 
 
+@pytest.mark.parametrize("kind", ["<f8", "<f4", ">f8", "<f2", "<i8", "<i4", "<u2", "|i1", "|u1", "|b1", "<c8", "<U3"])
+@pytest.mark.parametrize("shape", [(), (3,), (1,), (0, 3), (4, 3), (2, 3, 4), (2, 0, 1)])
+@pytest.mark.parametrize("order", "CF")
+def test_arrays_are_those_that_numpy_reads(tmp_path: Path, kind: str, shape: tuple[int, ...], order: str) -> None:
+    array = np.array(np.arange(24)[: int(np.prod(shape))].reshape(shape).astype(kind), order=order)
+    path = archive(tmp_path / "a.npz", one=npy(array), two=npy(np.zeros(2)))
+    with np.load(path) as stored:
+        expected = stored["one"]
+    found = files.read_npz(path)
+    assert list(found) == ["one", "two"] and found["one"].flags.writeable
+    assert (found["one"].dtype, found["one"].shape) == (expected.dtype, expected.shape)
+    assert np.array_equal(found["one"], expected)
+
+
+def test_an_array_that_is_cut_short_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="not a sound archive of arrays"):
+        files.read_npz(archive(tmp_path / "a.npz", a=npy(np.arange(9.0))[:-1]))
+
+
 def test_python_objects_are_not_loaded(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="Python objects"):
         files.read_npz(archive(tmp_path / "a.npz", a=npy(np.array([{}], dtype=object))))

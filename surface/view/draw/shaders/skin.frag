@@ -11,11 +11,24 @@ out vec4 colour;
 #ifdef FRECKLES
 in float v_freckles;
 
+#ifdef GRAIN_TEXELS
+#define FRECKLED 1.34           // unfiltered noise is higher at its peaks
+// One texel of a level at which the freckles' noise, smaller than the grain's, has texels as large as those of the grain.
+float noise(vec2 at, int level) {
+    int side = 2 * int(GRAIN_TEXELS) >> level;
+    return texelFetch(detail, ivec2(at * float(side)) & (side - 1), level).w;
+}
+#else
+#define FRECKLED 1.30
+float noise(vec2 at, int level) {
+    return texture(detail, at).w;
+}
+#endif
+
 // Cover of freckles: where two layers of noise, which repeat at different places, are both high.
 float freckle() {
-    float one = texture(detail, 4.37 * v_uv + vec2(0.31, 0.17)).w;
-    float two = texture(detail, 2.63 * v_uv.yx + vec2(0.05, 0.43)).w;
-    return smoothstep(1.30, 1.50, one + two + 0.16 * v_freckles) * min(2.0 * v_freckles, 1.0);
+    float both = noise(4.37 * v_uv + vec2(0.31, 0.17), 3) + noise(2.63 * v_uv.yx + vec2(0.05, 0.43), 2);
+    return smoothstep(FRECKLED, FRECKLED + 0.20, both + 0.16 * v_freckles) * min(2.0 * v_freckles, 1.0);
 }
 #endif
 

@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from surface.head import Head
-from surface.view import Camera, Offscreen
-from surface.view.draw import decimated_draw
+from surface.head.model.look import Look
+from surface.view import THEMES, Camera, Offscreen
+from surface.view.draw import decimated_draw, materials
 from surface.view.draw.decimated_draw import DrawCall, JoinedParts
 
 SIZE = (320, 240)
@@ -55,6 +56,55 @@ def test_what_does_not_move_is_not_sent(screen: Offscreen, head: Head) -> None:
     eye = next(p for p in renderer.evaluator.decimated.parts if p.part.name == "eye_right")  # type: ignore[attr-defined]
     assert sent[1] > len(eye.kept) and sent[2] == 0
     assert sent[3] >= len(eye.kept), "the eye, and lids that follow it"
+
+
+@pytest.mark.parametrize(
+    ("given", "camera", "drawn"),
+    [
+        ({}, Camera.front(), False),
+        ({"mouthPressLeft": 0.8, "mouthPressRight": 0.8, "headYaw": 0.4}, Camera.three_quarter(), False),
+        ({"jawOpen": 0.3}, Camera.front(), True),
+        ({"mouthFunnel": 0.6}, Camera.three_quarter(), True),
+        ({}, Camera.around(0.0, -40.0), True),
+    ],
+)
+def test_teeth_are_drawn_where_they_may_be_seen(
+    screen: Offscreen, head: Head, monkeypatch: pytest.MonkeyPatch, given: dict[str, float], camera: Camera, drawn: bool
+) -> None:
+    draw, names = screen.renderer._draw_part, []
+
+    def note(buffers: Any, *, multisampled: bool) -> None:
+        names.append(buffers.part.material)
+        draw(buffers, multisampled=multisampled)
+
+    monkeypatch.setattr(screen.renderer, "_draw_part", note)
+    screen.draw(head.values(given), camera)
+    assert ("teeth" in names, "gums" in names) == (drawn, drawn)
+    assert "mouth" in names and "tongue" in names
+
+
+def test_closed_lips_hide_teeth(screen: Offscreen, head: Head, monkeypatch: pytest.MonkeyPatch) -> None:
+    given = head.values({"mouthRollUpper": 0.5, "headYaw": 0.3})
+    screen.draw(given)
+    without = screen.read().astype(int)
+    monkeypatch.setattr(materials, "BEHIND_LIPS", ())
+    screen.target._shown = None  # else an equal picture is not drawn again
+    screen.draw(given)
+    off = np.abs(screen.read() - without).max(axis=2) > 8
+    assert off.mean() < 2e-4, "but for specks of teeth between the lips"
+
+
+def test_a_display_and_a_mouth_without_lining_hide_nothing(
+    screen: Offscreen, head: Head, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    renderer = screen.renderer
+    screen.draw(head.values({}), Camera.front())
+    assert renderer._lips_hide()
+    with monkeypatch.context() as patch:
+        patch.setattr(renderer, "theme", THEMES["robot"])
+        assert not renderer._lips_hide()
+    monkeypatch.setattr(renderer, "_lined", False)
+    assert not renderer._lips_hide()
 
 
 def test_positions_are_those_of_the_head(screen: Offscreen, head: Head) -> None:
@@ -130,3 +180,17 @@ def test_one_draw_call_owns_the_buffers_also_where_clothes_hide_its_parts(monkey
     assert len(made) == 1
     assert [call._owner for call in calls] == [True, False, False]
     assert [len(call.triangles) for call in calls] == [0, 4, 6]
+
+
+@pytest.mark.slow
+def test_freckles_of_live_pictures_are_about_as_many_as_those_of_stills(gl: None, root: Path) -> None:
+    darker = {}
+    for freckles in (0.0, 0.9):
+        freckled = Head.load(root / "configs" / "heads" / "ict", look=Look(freckles=freckles))
+        for samples in (None, 1):  # None: live, and drawn in software with fewer triangles and without filters
+            with Offscreen(freckled, (960, 720), samples=samples) as made:
+                made.draw(np.zeros(len(freckled.parameters)), Camera.front())
+                darker[freckles, samples] = made.read()[250:480, 280:680].astype(float)
+    live, still = ((darker[0.0, samples] - darker[0.9, samples]).mean() for samples in (None, 1))
+    assert 0.02 < still < 2.0, "freckles are few and seen"
+    assert 0.5 < live / still < 2.0
