@@ -72,11 +72,10 @@ def with_outside(head: Head, accessories: Sequence[Accessory]) -> tuple[Accessor
         return tuple(accessories)
     seen = _seen_sides(head, solid)
     own = np.split(seen, np.cumsum([len(one.triangles) for one in solid])[:-1])
-    found = dict(zip(map(id, solid), own, strict=True))
-    return tuple(
-        replace(one, outside=_facing(one.triangles, _widened(one, found[id(one)]))) if id(one) in found else one
-        for one in accessories
+    known = iter(
+        [replace(one, outside=_facing(one.triangles, _widened(one, s))) for one, s in zip(solid, own, strict=True)]
     )
+    return tuple(next(known) if one.alpha == "OPAQUE" else one for one in accessories)
 
 
 def _facing(triangles: NDArray[np.int32], seen: NDArray[np.bool_]) -> NDArray[np.int32]:
@@ -108,7 +107,7 @@ def _seen_sides(head: Head, solid: Sequence[Accessory]) -> NDArray[np.bool_]:
     """(t, 2) whether fronts and backs of all triangles of accessories are seen."""
     ctx = open_context()
     try:
-        pictures = _Numbered(ctx, head, solid)
+        pictures = _SidePictures(ctx, head, solid)
         seen = np.zeros((pictures.count, 2), np.bool_)
         for pixels in pictures.look():
             seen |= pixels >= (1, BACK_PIXELS)
@@ -117,7 +116,7 @@ def _seen_sides(head: Head, solid: Sequence[Accessory]) -> NDArray[np.bool_]:
         ctx.release()
 
 
-class _Numbered:
+class _SidePictures:
     """Pictures of the numbers of accessories' triangles, from 1 on, before a head, whose number is 0.
 
     count : of numbers, 1 + t.
@@ -133,8 +132,8 @@ class _Numbered:
         fixed = (share > FIXED).all(axis=1)
         rows = _numbered(corners, np.arange(1, self.count)).reshape(triangles, 3)
         self._points = corners.astype(np.float64)
+        # What turns with the whole head comes first: the rest does not hide it.
         self._worn = [self._array(rows[which]) for which in (fixed, ~fixed) if which.any()]
-        self._hiding = bool(fixed.any())
         self._parts = [self._of_part(part, still) for part, still in _still(head)]
         self._around = np.concatenate([np.asarray(part.vertices, np.float64) for part in head.parts])
         colour = ctx.texture((RESOLUTION, RESOLUTION), 4)
@@ -151,19 +150,17 @@ class _Numbered:
             set_uniforms(self._program, {"view_projection": matrix, "nearer": (0.0, 0.0, 0.0)})
             for array in self._parts:
                 array.render()
-            hiding, free = (self._worn[:1], self._worn[1:]) if self._hiding else ([], self._worn)
-            for arrays in (hiding, free):
-                self._draw_sides(arrays, direction)
+            for array in self._worn:
+                self._draw_sides(array, direction)
                 yield _pixels(self._target, self.count)
 
-    def _draw_sides(self, arrays: Sequence[moderngl.VertexArray], direction: NDArray[np.floating]) -> None:
-        """Draw the fronts and the backs of accessories, seen from a direction (3,)."""
+    def _draw_sides(self, array: moderngl.VertexArray, direction: NDArray[np.floating]) -> None:
+        """Draw the fronts and the backs of triangles of accessories, seen from a direction (3,)."""
         self._ctx.enable_only(self._ctx.DEPTH_TEST | self._ctx.CULL_FACE)
         for culled, nearer in (("back", NEARER_MM), ("front", NEARER_MM - BACK_MM)):
             self._ctx.cull_face = culled
             set_uniforms(self._program, {"nearer": nearer * direction})
-            for array in arrays:
-                array.render()
+            array.render()
 
     def _of_part(self, part: HeadPart, still: NDArray[np.bool_]) -> moderngl.VertexArray:
         """What hides something of a part: triangles all of whose vertices are ``still`` (m,)."""
@@ -193,7 +190,7 @@ def _still(head: Head) -> Iterator[tuple[HeadPart, NDArray[np.bool_]]]:
 
 
 def _numbered(corners: NDArray[np.floating], numbers: NDArray[np.int64]) -> NDArray[np.void]:
-    """(3 t,) rows of corners (3 t, 3) with the numbers (t,) of their triangles as colours."""
+    """(3 t,) rows of corners (3 t, 3), mm, with the numbers (t,) of their triangles as colours."""
     rows = np.zeros(len(corners), [("position", "<f4", 3), ("number", "<u4")])
     rows["position"], rows["number"] = corners, np.repeat(numbers, 3)
     return rows
