@@ -77,6 +77,20 @@ def test_what_turns_by_itself_hides_nothing(gl: None) -> None:
     assert len(sides(large)) >= 12 and len(sides(small)) == 12
 
 
+def test_skin_hides_what_lies_behind_it_where_it_turns_with_the_whole_head(gl: None) -> None:
+    def fronts(neck: Neck) -> int:
+        ctx = outside.open_context()
+        try:
+            pictures = outside._SidePictures(
+                ctx, Head(small_head(neck=neck)), [card((-15.0, -8.0), (15.0, 8.0), z=12.0)]
+            )
+            return int(sum(pixels[1:, 0].sum() for pixels in pictures.look()))
+        finally:
+            ctx.release()
+
+    assert 0 < fronts(TURNS) < 0.6 * fronts(Neck((0.0, 0.0, 0.0), 0.0, 90.0, 160.0))
+
+
 def test_narrow_triangles_beside_what_is_seen_count_as_seen() -> None:
     thin = replace(card(z=60.0), vertices=np.array([[0, 0, 0], [40, 0, 0], [40, 1, 0], [0, 40, 0]], np.float32))
     seen = np.array([[False, False], [True, False]])
@@ -99,11 +113,12 @@ def test_live_pictures_draw_only_what_can_be_seen_and_stay_the_same(gl: None, qu
                 screen.finish()
                 pictures.append(screen.target.read().astype(int))
             assert screen.renderer._accessories is not None
-            counts.append([one.array.vertices for one in screen.renderer._accessories._drawn])
+            counts.append([(one.array.vertices, one.two_sided) for one in screen.renderer._accessories._drawn])
             software = screen._sampling.simplified
     assert np.abs(np.array(pictures[:3]) - pictures[3:]).max() <= 2
     assert pictures[0].std() > 5.0
-    assert counts == [[36, 36, 6], [36, 12] if software else [36, 36, 6]]
+    every = [(36, True), (36, True), (6, True)]
+    assert counts == [every, [(36, False), (12, False)] if software else every]
 
 
 def test_it_is_kept_with_the_accessories_of_a_head(gl: None, tmp_path: Path) -> None:
