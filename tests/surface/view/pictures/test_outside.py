@@ -91,6 +91,11 @@ def test_skin_hides_what_lies_behind_it_where_it_turns_with_the_whole_head(gl: N
     assert 0 < fronts(TURNS) < 0.6 * fronts(Neck((0.0, 0.0, 0.0), 0.0, 90.0, 160.0))
 
 
+def test_what_an_open_pose_moves_hides_nothing(gl: None) -> None:
+    still = {part.name: bool(rows.any()) for part, rows in outside._still(head())}
+    assert still == {"a": True, "b": True, "tooth": False}
+
+
 def test_narrow_triangles_beside_what_is_seen_count_as_seen() -> None:
     thin = replace(card(z=60.0), vertices=np.array([[0, 0, 0], [40, 0, 0], [40, 1, 0], [0, 40, 0]], np.float32))
     seen = np.array([[False, False], [True, False]])
