@@ -18,6 +18,7 @@ LANES = 8
 VECTOR = ir.VectorType(ir.FloatType(), LANES)
 INDEX = ir.IntType(32)
 INDICES = ir.VectorType(INDEX, LANES)
+SHORTS = ir.VectorType(ir.IntType(16), LANES)
 PAIRS = [k // 2 + k % 2 * LANES for k in range(2 * LANES)]  # x0 y0 x1 y1 ... of two vectors
 
 
@@ -91,7 +92,11 @@ def zero(context, builder, kinds, args):
 
 @_operation(lanes, None, types.intp)
 def load(context, builder, kinds, args):
-    """Load ``array[index : index + 8]``."""
+    """Load ``array[index : index + 8]``; of an int16 array, the same numbers as float32."""
+    if kinds[0].dtype == types.int16:
+        data = context.make_array(kinds[0])(context, builder, args[0]).data
+        short = builder.bitcast(builder.gep(data, [args[1]]), SHORTS.as_pointer())
+        return builder.sitofp(builder.load(short, align=2), VECTOR)
     return builder.load(_pointer(context, builder, kinds[0], *args), align=4)
 
 

@@ -7,13 +7,14 @@ from math import factorial
 
 import numpy as np
 
-from surface.base.arrays import Floats, Floats32, Ints
+from surface.base.arrays import Floats, Floats32, Ints, Shorts
 from surface.base.jit import inlined, kernel, nonallocating
 from surface.spline.lanes import add, fma_at, item, load, store3, zero
 
 # The cornea protrudes from the eyeball: its sphere's centre and radius, in eyeball radii, as
 # surface.fit.points.eyeball has it
 CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
+SHARE_STEP = 1.0 / 32767.0  # shares of control points in samples are whole multiples of it: half the memory to read
 MAX_SIGHT = 0.7  # tangent of 35 degrees: up to this far from the front, closed lips still look closed
 # coefficients of Taylor's series: of x**10 to 1, of the sine over x and of the cosine
 SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(5, -1, -1))
@@ -55,17 +56,18 @@ def sum_rows(table, base, picks, first, end, by_pick, rows):  # type: ignore[no-
 
 @nonallocating
 def place_samples(
-    start: Ints, ids: Ints, share: Floats32, local: Floats, around: bool, single: Floats32, room: Floats32, out: Floats
+    start: Ints, ids: Ints, share: Shorts, local: Floats, around: bool, single: Floats32, room: Floats32, out: Floats
 ) -> None:  # fmt: skip
     """Samples ``out (s, 4)`` of a surface: x, y and z from the eyeball's centre, and depth, from control points
     ``local (k, 3)``, which are relative to that centre, too.
 
-    Eight samples at a time: those of tile t are the sums of eight ``share`` each times the points ``ids`` between
-    ``start[t]`` and ``start[t + 1]``; ``single (k, 3)`` and ``room (24,)`` are scratch space. Depth is the distance
-    from the centre if samples lie ``around`` an eyeball, else z.
+    Eight samples at a time: those of tile t are the sums of eight ``share`` each, in steps of :data:`SHARE_STEP`, times
+    the points ``ids`` between ``start[t]`` and ``start[t + 1]``; ``single (k, 3)`` and ``room (24,)`` are scratch
+    space. Depth is the distance from the centre if samples lie ``around`` an eyeball, else z.
     """
     for k in range(len(local)):
-        single[k, 0], single[k, 1], single[k, 2] = local[k, 0], local[k, 1], local[k, 2]
+        for c in range(3):
+            single[k, c] = SHARE_STEP * local[k, c]
     for tile in range(len(start) - 1):
         x, y, z = sum_rows(share, 0, ids, start[tile], start[tile + 1], False, single)
         store3(room, 0, x, y, z)
@@ -282,12 +284,14 @@ def find_lifts(heights: Floats, least: Floats, most: Floats, hold: Floats, gain:
 
 
 @kernel
-def lift_points(ids: Ints, lifts: Floats, samples: Floats, table: Floats32, room: Floats32, points: Floats) -> None:
+def lift_points(
+    ids: Ints, lifts: Floats, samples: Floats, table: Shorts, steps: Floats, room: Floats32, points: Floats
+) -> None:  # fmt: skip
     """Move ``points (n, 3)`` with the numbers ``ids (k,)`` by ``lifts (s,)``, mm, each away from the eyeball's centre
     at its sample (s, 4).
 
-    ``table (8 b s,)`` says how far points move per lift: for every eight of them, sample after sample. ``room (24,)``
-    is scratch space.
+    ``table (8 b s,)`` says how far points move per lift, in each point's ``steps (k,)``: for every eight of them,
+    sample after sample. ``room (24,)`` is scratch space.
     """
     ways, used, count = np.empty((len(lifts), 3), np.float32), np.empty(len(lifts), np.int64), 0
     for s in range(len(lifts)):
@@ -302,7 +306,7 @@ def lift_points(ids: Ints, lifts: Floats, samples: Floats, table: Floats32, room
         store3(room, 0, x, y, z)
         for k in range(first, min(first + 8, len(ids))):
             for c in range(3):
-                points[ids[k], c] += room[3 * (k - first) + c]
+                points[ids[k], c] += steps[k] * room[3 * (k - first) + c]
 
 
 @nonallocating

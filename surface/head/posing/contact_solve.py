@@ -6,7 +6,7 @@ the kernels take are made by :mod:`.contact`:
 
 ``sampling`` : near (p,) control points of the samples; start, ids, share as :func:`.contact.tile_weights` gives them,
     with indices into ``near``; own (k,) indices into ``near`` of the points that are moved
-``limits`` : least, most, hold (s,) float64, radius and gain of :func:`.contact_kernels.find_lifts`; table of
+``limits`` : least, most, hold (s,) float64, radius and gain of :func:`.contact_kernels.find_lifts`; table and steps of
     :func:`.contact_kernels.lift_points`
 ``work`` : local, found (p, 3) float64; single (p, 3), room (24,) float32; samples (s, 4), heights, lifts (s,) float64;
     looked (4,), placed, trial (s, 4) float64
@@ -35,8 +35,8 @@ SEAL_PASSES = 2  # of bringing sides together: the second closes what bending le
 STILL_MM = 2e-3
 """Where no sample has moved further since a contact was solved, its points are moved as they were then.
 
-A blink moves the other eye's lids, and the lips, by less than half of it: solving these contacts again reads tables that
-other work has driven out of the caches, and moves nothing that could be seen."""
+A blink moves the other eye's lids, and the lips, by less than half of it: solving these contacts again reads tables
+that other work has driven out of the caches, and moves nothing that could be seen."""
 
 
 @nonallocating
@@ -98,12 +98,12 @@ def lift_once(axis, tolerance, sampling, limits, work):
     """Move points once where the placed samples are off the eyeball by more than ``tolerance``, mm; returns the largest
     error."""
     _, _, _, _, own = sampling
-    least, most, hold, radius, gain, table = limits
+    least, most, hold, radius, gain, table, steps = limits
     local, _, _, room, samples, heights, lifts, _, _, _ = work
     find_heights(samples, radius, axis, heights)
     error = find_lifts(heights, least, most, hold, gain, lifts)
     if error > tolerance:
-        lift_points(own, lifts, samples, table, room, local)
+        lift_points(own, lifts, samples, table, steps, room, local)
     return error
 
 

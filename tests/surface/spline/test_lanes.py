@@ -36,6 +36,16 @@ def test_every_operation() -> None:
     assert np.array_equal(out[64:].reshape(8, 3), np.stack([x, b, np.full(8, number)], axis=1))
 
 
+def test_short_numbers_are_loaded_as_they_are() -> None:
+    @njit
+    def loaded(shorts, out):
+        lanes.store(out, 0, lanes.load(shorts, 3))
+
+    shorts, out = np.array([7, 7, 7, -32768, -1, 0, 1, 32767, 2, 3, 4, 9], np.int16), np.empty(8, np.float32)
+    loaded(shorts, out)
+    assert out.tolist() == shorts[3:11].tolist()
+
+
 def test_the_greatest_of_three_and_whether_any_lane_reaches_a_number() -> None:
     @njit
     def largest(a, b, c, out):

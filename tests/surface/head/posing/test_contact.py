@@ -29,6 +29,7 @@ from surface.head.posing.contact import (
     tile_weights,
     weights_at,
 )
+from surface.head.posing.contact_kernels import SHARE_STEP
 
 N, ROWS, COLUMNS = 12, 9, 11
 AHEAD, UP = np.array([0.0, 0.0, 1.0]), np.array([0.0, 0.96, 0.28])
@@ -183,10 +184,17 @@ def test_limits_hold_what_rests_near_and_free_what_rests_far() -> None:
 
 
 def test_tables_lie_in_memory_eight_points_at_a_time() -> None:
-    table = np.random.default_rng(2).random((5, 11)).astype(np.float32)
-    packed = by_lanes(table).reshape(2, 5, 8)
-    np.testing.assert_array_equal(np.hstack([packed[0], packed[1, :, :3]]), table)
-    assert not packed[1, :, 3:].any()
+    table = np.random.default_rng(2).normal(size=(5, 11)) * np.logspace(-3, 1, 11)
+    packed, steps = by_lanes(table)
+    first, second = packed.reshape(2, 5, 8)
+    again = np.hstack([first, second[:, :3]]) * steps
+    assert (np.abs(again - table) <= 0.51 * steps).all() and np.allclose(32767 * steps, np.abs(table).max(axis=0))
+    assert not second[:, 3:].any()
+
+
+def test_points_that_move_no_sample_have_empty_columns() -> None:
+    packed, _ = by_lanes(np.zeros((4, 2)))
+    assert not packed.any()
 
 
 def test_weights_are_those_of_the_surface_and_add_up() -> None:
@@ -201,8 +209,8 @@ def test_weights_are_those_of_the_surface_and_add_up() -> None:
     again = np.zeros((40, surface.n))
     for tile in range(5):
         rows = slice(tile_start[tile], tile_start[tile + 1])
-        again[8 * tile : 8 * tile + 8, tile_ids[rows]] = packed.reshape(-1, 8)[rows].T
-    np.testing.assert_allclose(again[:37], dense, atol=1e-6)
+        again[8 * tile : 8 * tile + 8, tile_ids[rows]] = packed.reshape(-1, 8)[rows].T * SHARE_STEP
+    np.testing.assert_allclose(again[:37], dense, atol=0.51 * SHARE_STEP)
     assert not again[37:].any()
 
 

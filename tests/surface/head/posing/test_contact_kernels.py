@@ -37,8 +37,8 @@ def directions(count: int) -> np.ndarray:
 
 def samples_at(points: np.ndarray) -> np.ndarray:
     """(s, 4) as x, y, z and depth of points (s, 3) from the eyeball's centre."""
-    start, ids, share = np.arange(len(points) + 1), np.arange(len(points)), np.zeros(8 * len(points), np.float32)
-    share[::8] = 1.0
+    start, ids, share = np.arange(len(points) + 1), np.arange(len(points)), np.zeros(8 * len(points), np.int16)
+    share[::8] = 32767
     out, single = np.empty((8 * len(points), 4)), np.empty((len(points), 3), np.float32)
     place_samples(start, ids, share, points, True, single, np.empty(24, np.float32), out)
     return np.ascontiguousarray(out[::8])
@@ -87,8 +87,8 @@ def test_a_lift_goes_away_from_the_eyeball_where_its_sample_stands():
     way = directions(60)[:21]
     points, rest, lifts = np.zeros((23, 3)), samples_at(13.0 * way), np.linspace(-0.5, 0.5, 21)
     table = np.random.default_rng(3).uniform(0, 1, (21, 19))  # three tiles of points, the last one not full
-    lift_points(np.arange(19) + 1, lifts, rest, by_lanes(table), np.empty(24, np.float32), points)
-    np.testing.assert_allclose(points[1:20], (lifts[:, None] * table).T @ way, atol=1e-5)
+    lift_points(np.arange(19) + 1, lifts, rest, *by_lanes(table), np.empty(24, np.float32), points)
+    np.testing.assert_allclose(points[1:20], (lifts[:, None] * table).T @ way, atol=1e-4)
     assert not points[0].any() and not points[20:].any() and lifts[10] == 0.0
 
 
@@ -250,9 +250,10 @@ def test_samples_are_sums_of_points_by_tiles_of_eight(around):
     rng = np.random.default_rng(6)
     local = rng.normal(size=(4, 3)) + np.array([-1.0, 1.0, 9.0])
     start, ids = np.array([0, 2, 3]), np.array([1, 3, 0])
-    share = rng.random((3, 8)).astype(np.float32)
+    packed = rng.integers(0, 32768, (3, 8)).astype(np.int16)
+    share = packed / 32767
     out, single = np.empty((11, 4)), np.empty((4, 3), np.float32)
-    place_samples(start, ids, share.ravel(), local, around, single, np.empty(24, np.float32), out)
+    place_samples(start, ids, packed.ravel(), local, around, single, np.empty(24, np.float32), out)
     sums = np.concatenate([share[:2].T @ local[[1, 3]], np.outer(share[2], local[0])])[:11]
     np.testing.assert_allclose(out[:, :3], sums, rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(out[:, 3], np.linalg.norm(sums, axis=1) if around else sums[:, 2], rtol=1e-4, atol=1e-4)
