@@ -84,7 +84,7 @@ def arrays_of(table):
         _flat(table, 33, np.int64), _flat(table, 34, np.int64), _flat(table, 35, np.int32), _flat(table, 36, np.int32),
         _flat(table, 37, np.float32), _flat(table, 38, np.int32),
         _flat(table, 39, np.int64), _flat(table, 40, np.int64), _flat(table, 41, np.uint16),
-        _flat(table, 42, np.float32), _flat(table, 43, np.float32), _flat(table, 44, np.int64),
+        _flat(table, 42, np.float32), _flat(table, 43, np.int16), _flat(table, 44, np.int64),
         _flat(table, 45, np.uint16), _flat(table, 46, np.int64), _flat(table, 47, np.uint16),
         _flat(table, 48, np.uint8), _flat(table, 49, np.float64), _flat(table, 50, np.int32),
     )  # fmt: skip

@@ -4,6 +4,10 @@ A cell's list is longer than that of any of its tiles, so a block holds many row
 tile after tile, the rows that are not all zero, and for each which point of the cell's list it belongs to. Its vertices
 are put into tiles so that those of a tile share most of their points; ``order`` leads back to the mesh's order. Cells
 that are packed get blocks of plain weights, in the mesh's order, before their weights or knots change.
+
+Derivatives of weights are whole numbers of steps, one step in u and one in v for each tile, so that they take half of
+the memory that every frame reads. Normals are directions, in which a common factor of all derivatives does not show:
+kernels take the numbers as they are. That turns a normal by less than 1e-4 (measured, see tests).
 """
 
 # mypy: allow-untyped-defs
@@ -14,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surface.base.arrays import Bools, Floats32, Ints
+from surface.base.arrays import Bools, Floats32, Ints, Shorts
 from surface.base.jit import kernel
 
 from .lists import LANES, Lists
@@ -22,6 +26,7 @@ from .lists import LANES, Lists
 PLAIN = -1  # in ``packed_at``: the cell is not packed; in ``order_at``: its lanes follow the mesh's order
 CANDIDATES = 64  # vertices, the next ones in the mesh's order, among which the next one of a tile is chosen
 MAX_REMAINING = 0.97  # fraction of rows that reordering may leave; if it leaves more, vertices stay in order
+MAX_STEPS = 32767
 MAX_ROWS = 1 << 16  # rows or vertices of a cell that can be packed: their numbers are uint16
 
 
@@ -32,22 +37,24 @@ class Packed:
     packed_at : (c,) int64, where every cell's tiles start in ``tile_entry``; PLAIN where the cell is not packed
     tile_entry : (t,) int64, where every tile's entries start; after a cell's last tile, where these end
     entry_row : (e,) uint16, the row of each entry's point in the cell's list
-    packed : (8 e,) float32; packed_slope : (16 e,) float32, or empty for a mesh without normals
+    packed : (8 e,) float32; packed_slope : (16 e,) int16 in steps, or empty for a mesh without normals
     places_at : (c,) int64, where every cell's rows start in ``places``
     places : (p,) uint16, by row and tile: the entry's number in its tile, from 1 on; 0 if there is none
     order_at : (c,) int64, where every cell's lanes start in ``order``; PLAIN where they follow the mesh's order
     order : (o,) uint16, the vertex of every lane, counted from the cell's first one
+    slope_step : (t, 2) float32, the step of every tile's derivatives in u and in v; (0, 2) for a mesh without normals
     """
 
     packed_at: Ints
     tile_entry: Ints
     entry_row: np.ndarray
     packed: Floats32
-    packed_slope: Floats32
+    packed_slope: Shorts
     places_at: Ints
     places: np.ndarray
     order_at: Ints
     order: np.ndarray
+    slope_step: Floats32
 
     @property
     def nbytes(self) -> int:
@@ -90,12 +97,14 @@ def pack(lists: Lists, order: Order, wanted: Bools) -> Packed:
     blocks = lists.rows * tiles
     chosen = wanted & (order.entries < blocks) & (lists.rows < MAX_ROWS) & (np.diff(lists.cell_start) <= MAX_ROWS)
     entries, moved = int(order.entries[chosen].sum()), chosen & order.moved
+    sloped, ends = len(lists.slope) > 0, int((tiles + 1)[chosen].sum())
     made = Packed(
-        packed_at=_cell_starts(tiles + 1, chosen), tile_entry=np.zeros(int((tiles + 1)[chosen].sum()), np.int64),
+        packed_at=_cell_starts(tiles + 1, chosen), tile_entry=np.zeros(ends, np.int64),
         entry_row=np.zeros(entries, np.uint16), packed=np.zeros(LANES * entries, np.float32),
-        packed_slope=np.zeros(2 * LANES * entries if len(lists.slope) else 0, np.float32),
+        packed_slope=np.zeros(2 * LANES * entries * sloped, np.int16),
         places_at=_cell_starts(blocks, chosen), places=np.zeros(int(blocks[chosen].sum()), np.uint16),
         order_at=_cell_starts(LANES * tiles, moved), order=order.order[np.repeat(moved, LANES * tiles)],
+        slope_step=np.ones((ends * sloped, 2), np.float32),
     )  # fmt: skip
     _pack_cells(
         lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.value, lists.slope, *vars(made).values()
@@ -120,11 +129,14 @@ def unpack_cell(lists: Lists, made: Packed, c: int) -> list[Floats32]:
     tile = np.repeat(np.arange(tiles), np.diff(starts))
     row = made.entry_row[which].astype(np.int64)
     lanes = made.order[at : at + size].astype(np.int64) if at >= 0 else np.arange(size)
+    steps = made.slope_step[first : first + tiles]
+    tables = [(made.packed, np.ones((tiles, 1), np.float32)), (made.packed_slope, steps)]
     blocks = []
-    for table, wide in ((made.packed, 1), (made.packed_slope, 2))[: 1 + (len(made.packed_slope) > 0)]:
+    for table, step in tables[: 1 + (len(steps) > 0)]:
+        wide = step.shape[1]
         own = np.zeros((rows, wide, tiles, LANES), np.float32)
         entries = table[LANES * wide * which.start : LANES * wide * which.stop].reshape(-1, wide, LANES)
-        own[row, :, tile] = entries
+        own[row, :, tile] = entries * step[tile, :, None]
         flat = own.reshape(rows, wide, -1)
         back = np.zeros_like(flat)
         back[..., lanes] = flat[..., :size]
@@ -233,33 +245,56 @@ def _order_cells(cell_start, tile_start, rows, at, value, slope, choice, worth, 
 
 
 @kernel
+def _read_row(first, count, k, rows, at, value, slope, order_at, order, own):
+    """Copy b w, b_u w and b_v w of point k in ``count`` lanes from ``first`` to ``own (3, 8)``; is any not 0?"""
+    own[:] = 0.0
+    for j in range(count):
+        s = np.int64(order[order_at + first + j]) if order_at >= 0 else first + j
+        w = at + ((s // 8) * rows + k) * 8
+        own[0, j] = value[w + s % 8]
+        if slope.shape[0] > 0:
+            own[1, j], own[2, j] = slope[2 * w + s % 8], slope[2 * w + 8 + s % 8]
+    return own.any()
+
+
+@kernel
+def _choose_steps(first, count, rows, at, slope, order_at, order, step):
+    """Set ``step (2,)`` so that the largest derivatives in u and in v of ``count`` lanes from ``first`` are 32767 of
+    them; 1 where all are zero."""
+    most_u, most_v = 0.0, 0.0
+    for j in range(first, first + count):
+        s = np.int64(order[order_at + j]) if order_at >= 0 else j
+        for k in range(rows):
+            w = 2 * (at + ((s // 8) * rows + k) * 8) + s % 8
+            most_u, most_v = max(most_u, abs(slope[w])), max(most_v, abs(slope[w + 8]))
+    step[0] = most_u / MAX_STEPS if most_u > 0.0 else 1.0
+    step[1] = most_v / MAX_STEPS if most_v > 0.0 else 1.0
+
+
+@kernel
 def _pack_cells(
     cell_start, tile_start, rows, at, value, slope, packed_at, tile_entry, entry_row, packed, packed_slope, places_at,
-    places, order_at, order,
+    places, order_at, order, slope_step,
 ):  # fmt: skip
     """Fill the arrays of :class:`Packed` from the blocks of cells."""
-    e, own = 0, np.zeros((3, 8), np.float32)
+    e, own, unit = 0, np.zeros((3, 8), np.float32), np.ones(2, np.float32)
     for c in range(rows.shape[0]):
         if packed_at[c] < 0:
             continue
         size, tiles = cell_start[c + 1] - cell_start[c], tile_start[c + 1] - tile_start[c]
         for t in range(tiles):
             tile_entry[packed_at[c] + t] = first = e
+            step = slope_step[packed_at[c] + t] if slope.shape[0] > 0 else unit
+            if slope.shape[0] > 0:
+                _choose_steps(8 * t, min(8, size - 8 * t), rows[c], at[c], slope, order_at[c], order, step)
             for k in range(rows[c]):
-                own[:] = 0.0
-                found = False
-                for j in range(min(8, size - 8 * t)):
-                    s = np.int64(order[order_at[c] + 8 * t + j]) if order_at[c] >= 0 else 8 * t + j
-                    w = at[c] + ((s // 8) * rows[c] + k) * 8
-                    own[0, j] = value[w + s % 8]
-                    if slope.shape[0] > 0:
-                        own[1, j], own[2, j] = slope[2 * w + s % 8], slope[2 * w + 8 + s % 8]
-                    found = found or own[0, j] != 0.0 or own[1, j] != 0.0 or own[2, j] != 0.0
-                if not found:
+                if not _read_row(8 * t, min(8, size - 8 * t), k, rows[c], at[c], value, slope, order_at[c], order, own):
                     continue
                 packed[8 * e : 8 * e + 8] = own[0]
                 if slope.shape[0] > 0:
-                    packed_slope[16 * e : 16 * e + 8], packed_slope[16 * e + 8 : 16 * e + 16] = own[1], own[2]
+                    for j in range(8):
+                        packed_slope[16 * e + j] = np.int16(np.rint(own[1, j] / step[0]))
+                        packed_slope[16 * e + 8 + j] = np.int16(np.rint(own[2, j] / step[1]))
                 entry_row[e] = k
                 e += 1
                 places[places_at[c] + k * tiles + t] = e - first

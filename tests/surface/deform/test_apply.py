@@ -28,7 +28,7 @@ def test_positions_and_normals_are_those_of_the_surface() -> None:
     normals = np.cross(su, sv)
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     assert np.abs(deformation.vertices - points).max() < 1e-4
-    assert np.abs(deformation.normals - normals).max() < 1e-5
+    assert np.abs(deformation.normals - normals).max() < 1e-4  # derivatives are kept in 16 bits
 
 
 def test_denominators_are_sums_of_weights() -> None:

@@ -27,7 +27,7 @@ def check(deformation: Deformation[DCPSurface]) -> None:
     points, normals, size = fresh(deformation)
     assert np.abs(deformation.vertices - points).max() < 1e-6 * SIZE
     error = np.abs(deformation.normals - normals).max(axis=1)
-    assert (error * np.minimum(1, size / np.median(size))).max() < 1e-5  # random moves fold the sheet here and there
+    assert (error * np.minimum(1, size / np.median(size))).max() < 1e-4  # random moves fold the sheet here and there
 
 
 def interior(surface: DCPSurface, i: int) -> int:
@@ -49,7 +49,7 @@ def test_starts_as_the_mesh(flip: bool) -> None:
     mesh = surface.tessellate(chord_error=0.3, flip=flip)
     deformation = surface.deformation(mesh)
     assert np.allclose(deformation.vertices, mesh.vertices, rtol=0, atol=1e-6 * SIZE)
-    assert np.allclose(deformation.normals, mesh.normals, rtol=0, atol=1e-5)
+    assert np.allclose(deformation.normals, mesh.normals, rtol=0, atol=1e-4)
     assert deformation.changed == [(0, len(mesh.vertices))]
 
 
@@ -197,7 +197,9 @@ def test_without_normals(sheet: tuple[DCPSurface, Mesh]) -> None:
         deformation.move([10, 20], [[1.0, 2.0, 3.0], [3.0, 2.0, 1.0]])
     assert np.allclose(full.vertices, decimated.vertices, rtol=0, atol=1e-6 * SIZE)
     assert decimated.normals.shape == (0, 3)
-    assert decimated.nbytes < full.nbytes
+    for deformation, held in ((full, True), (decimated, False)):
+        tables = deformation.lists.slope, deformation.storage.packed.packed_slope, deformation.storage.packed.slope_step
+        assert any(len(table) for table in tables) == held
 
 
 def test_ids_that_stand_twice_move_twice(sheet: tuple[DCPSurface, Mesh]) -> None:

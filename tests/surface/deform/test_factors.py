@@ -128,7 +128,7 @@ def test_updates_of_any_kind_agree_with_a_new_evaluation(normals: bool) -> None:
         if normals:
             wanted = np.cross(su, sv)
             wanted /= np.linalg.norm(wanted, axis=1)[:, None]
-            assert np.abs(deformation.normals - wanted).max() < 3e-6
+            assert np.abs(deformation.normals - wanted).max() < 1e-4  # some cells are packed, with 16 bits
 
     check()
     for _ in range(4):  # the first stores numerators, those after it add differences

@@ -81,11 +81,11 @@ def test_places_that_32_bit_numbers_do_not_have_are_refused(
 
 def test_moves_that_lead_beyond_32_bit_numbers_are_refused_one_by_one(sheet: tuple[DCPSurface, Mesh]) -> None:
     deformation = sheet[0].deformation(sheet[1])
-    deformation.move([30], [[2e35, 0, 0]])
-    for further in (2e38, 2e36):
-        with pytest.raises(ValueError, match=r"delta\[0\]: must be within [4-9][.\d]*e\+35, and lead"):
+    deformation.move([30], [[2e31, 0, 0]])
+    for further in (2e38, 2e34):
+        with pytest.raises(ValueError, match=r"delta\[0\]: must be within [1-9][.\d]*e\+3[12], and lead"):
             deformation.move([30], [[further, 0, 0]])
-    assert deformation.points[30, 0] == pytest.approx(2e35)
+    assert deformation.points[30, 0] == pytest.approx(2e31)
     assert off(deformation) < 1e-6
     deformation.set_points(sheet[0].points)
     assert off(deformation) < 1e-6 and np.isfinite(deformation.normals).all()
@@ -96,28 +96,28 @@ def test_weights_and_knots_that_lead_beyond_32_bit_numbers_are_refused_and_chang
 ) -> None:
     surface, mesh = sheet
     deformation = surface.deformation(mesh)
-    deformation.move([30], [[2e35, 0, 0]])
-    before, farthest = deformation.vertices.copy(), r"points are up to 2e\+35 away from 0.* beyond [.\d]+e\+3[2-4]"
+    deformation.move([30], [[2e31, 0, 0]])
+    before, farthest = deformation.vertices.copy(), r"points are up to 2e\+31 away from 0.* beyond [.\d]+e\+(2[6-9]|30)"
     with pytest.raises(ValueError, match="weights: " + farthest):
-        deformation.set_weights([100], [1e3])
+        deformation.set_weights([100], [1e7])
     u, at = surface.knots_u[100], mesh.uv[np.abs(mesh.uv[:, 0] - surface.knots_u[100][2]).argmin(), 0]
-    steep = [at, at, at, at, at + 1e-5]
+    steep = [at, at, at, at, at + 1e-9]
     with pytest.raises(ValueError, match="knots_u, knots_v: " + farthest):
         deformation.set_knots(100, steep, surface.knots_v[100])
     assert deformation.basis.weights[100] == 1.0 and np.array_equal(deformation.basis.knots[0][100, : len(u)], u)
     deformation.refresh()
     assert np.isfinite(deformation.vertices).all() and off(deformation) < 1e-6
-    np.testing.assert_allclose(deformation.vertices, before, rtol=1e-6, atol=1e29)
-    deformation.move([30], [[2e35, 0, 0]])
+    np.testing.assert_allclose(deformation.vertices, before, rtol=1e-6, atol=1e25)
+    deformation.move([30], [[2e31, 0, 0]])
     with pytest.raises(ValueError, match=r"mesh: points are up to 3e\+38 away"):
         DCPSurface(surface.points + 3e38, surface.weights, surface.knots_u, surface.knots_v).deformation(mesh)
 
 
 def test_normals_of_places_far_away_are_those_of_the_surface(sheet: tuple[DCPSurface, Mesh]) -> None:
     surface, mesh = sheet
-    for scale in (1.0, 1e5, 1e10, 1e30, 1e33):
+    for scale in (1.0, 1e5, 1e10, 1e25, 1e29):
         scaled = DCPSurface(scale * surface.points, surface.weights, surface.knots_u, surface.knots_v)
-        assert tilt(scaled.deformation(mesh)) < 1e-5
+        assert tilt(scaled.deformation(mesh)) < 1e-4
 
 
 def test_a_surface_keeps_its_digits_while_it_shrinks_slowly_and_when_it_comes_from_far_away(

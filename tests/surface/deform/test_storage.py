@@ -75,7 +75,9 @@ def test_blocks_come_back_as_they_were(body: tuple[DCPSurface, Mesh], normals: b
     assert lists.used == len(build_lists(*body, False).value) <= len(lists.value)
     for c in cells:
         found, wanted = blocks_of(lists, c), blocks_of(plain, c)
-        assert np.abs(found - wanted).max() <= 4e-7 * np.abs(wanted).max(), c
+        assert np.abs(found - wanted)[..., 0].max() <= 4e-7 * np.abs(wanted).max(), c
+        most = np.abs(wanted).max(axis=(0, 1))  # derivatives of packed cells are kept in 16 bits
+        assert (np.abs(found - wanted).max(axis=(0, 1)) <= 2e-5 * most).all(), c
     for c, block in kept.items():
         assert np.array_equal(blocks_of(lists, c), block)
 
