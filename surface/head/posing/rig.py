@@ -86,7 +86,7 @@ class SkinRig:
         Corrections at the part's own contacts are put into ``pose.pushes``, and those of lips into ``pose.lip``.
         moved : (n, 3) positions as moved by groups alone, if known.
         """
-        np.take(self._drivers.amounts(pose.shapes), self._moves.used, out=self._amounts)
+        self._drivers.amounts(pose.shapes).take(self._moves.used, out=self._amounts, mode="clip")  # unbuffered
         key = self._pose_key(pose)
         if key != self._last_key:
             self._last_key = key
@@ -138,6 +138,8 @@ class SkinRig:
 
     def _seal_amounts(self, pose: Pose) -> list[float]:
         """Return how firmly each contact of the part keeps its sides together in a pose."""
+        if not self._solvers:
+            return []
         if not self._measured:
             self._measured = True
             for opening in filter(None, self._openings):
