@@ -79,7 +79,7 @@ class Deformation(Generic[Table]):
         self.mesh, self.basis = merge_cells(mesh), Basis.of(surface)
         self.lists = build_lists(surface, self.mesh, normals, progress)
         self._work = self.lists.rows * np.diff(self.lists.tile_start) * LANES  # weights by cell, however they are kept
-        self.storage = compress(self.basis, self.lists, self.mesh)
+        self.storage = compress(self.basis, self.lists, self.mesh, surface.arrays()[4])
         self._sign, self._threads = np.float32(-1 if mesh.flip else 1), threads
         self._most = int(RECOMPUTE_FRACTION * len(surface.arrays()[4]))
         self._pool: ThreadPoolExecutor | None = None  # started when first used

@@ -7,7 +7,8 @@ that are packed get blocks of plain weights, in the mesh's order, before their w
 
 Derivatives of weights are whole numbers of steps, one step in u and one in v for each tile, so that they take half of
 the memory that every frame reads. Normals are directions, in which a common factor of all derivatives does not show:
-kernels take the numbers as they are. That turns a normal by less than 1e-4 (measured, see tests).
+kernels take the numbers as they are. Each is rounded up or down so that together they change the derivatives of the
+surface as it is packed least; where control points lie close together, those further away would change them most.
 """
 
 # mypy: allow-untyped-defs
@@ -18,7 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surface.base.arrays import Bools, Floats32, Ints, Shorts
+from surface.base.arrays import Bools, Floats, Floats32, Ints, Shorts
 from surface.base.jit import kernel
 
 from .lists import LANES, Lists
@@ -27,6 +28,7 @@ PLAIN = -1  # in ``packed_at``: the cell is not packed; in ``order_at``: its lan
 CANDIDATES = 64  # vertices, the next ones in the mesh's order, among which the next one of a tile is chosen
 MAX_REMAINING = 0.97  # fraction of rows that reordering may leave; if it leaves more, vertices stay in order
 MAX_STEPS = 32767
+BALANCE_ROUNDS = 2  # of choosing how derivatives are rounded
 MAX_ROWS = 1 << 16  # rows or vertices of a cell that can be packed: their numbers are uint16
 
 
@@ -91,8 +93,8 @@ def order_vertices(lists: Lists) -> Order:
     return found
 
 
-def pack(lists: Lists, order: Order, wanted: Bools) -> Packed:
-    """Pack those of the ``wanted (c,)`` cells that have rows of zeros."""
+def pack(lists: Lists, order: Order, wanted: Bools, points: Floats) -> Packed:
+    """Pack those of the ``wanted (c,)`` cells that have rows of zeros; ``points (n, 3)`` are the control points."""
     tiles = np.diff(lists.tile_start)
     blocks = lists.rows * tiles
     chosen = wanted & (order.entries < blocks) & (lists.rows < MAX_ROWS) & (np.diff(lists.cell_start) <= MAX_ROWS)
@@ -109,6 +111,12 @@ def pack(lists: Lists, order: Order, wanted: Bools) -> Packed:
     _pack_cells(
         lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.value, lists.slope, *vars(made).values()
     )
+    if sloped:
+        _balance(
+            lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.ids_at, lists.ids, lists.value, lists.slope,
+            made.packed_at, made.tile_entry, made.entry_row, made.packed_slope, made.order_at, made.order,
+            made.slope_step, points,
+        )  # fmt: skip
     return made
 
 
@@ -299,3 +307,62 @@ def _pack_cells(
                 e += 1
                 places[places_at[c] + k * tiles + t] = e - first
         tile_entry[packed_at[c] + tiles] = e
+
+
+@kernel
+def _balance(
+    cell_start, tile_start, rows, at, ids_at, ids, value, slope, packed_at, tile_entry, entry_row, packed_slope,
+    order_at, order, slope_step, points,
+):  # fmt: skip
+    """Round the derivatives of all packed cells so that those of the surface with ``points (n, 3)`` change least."""
+    for c in range(rows.shape[0]):
+        if packed_at[c] < 0:
+            continue
+        places, away = np.empty((rows[c], 3)), np.empty((rows[c], 3))
+        for k in range(rows[c]):
+            places[k] = points[ids[ids_at[c] + k]]
+        for lane in range(cell_start[c + 1] - cell_start[c]):
+            t = packed_at[c] + lane // 8
+            s = np.int64(order[order_at[c] + lane]) if order_at[c] >= 0 else lane
+            w = at[c] + (s // 8) * rows[c] * 8 + s % 8
+            _from_vertex(w, entry_row[tile_entry[t] : tile_entry[t + 1]], value, places, away)
+            for q in range(2):
+                _balance_vertex(
+                    2 * w - s % 8 + 8 * q, lane % 8 + 8 * q, tile_entry[t], tile_entry[t + 1], slope_step[t, q], slope,
+                    entry_row, packed_slope, away,
+                )  # fmt: skip
+
+
+@kernel
+def _from_vertex(w, used, value, places, away):
+    """Write those of ``places (rows, 3)`` of a cell's points that are ``used (k,)``, from the vertex whose weights
+    start at ``w``, eight apart, to ``away (rows, 3)``."""
+    total = 0.0
+    for k in used:
+        total += value[w + 8 * np.int64(k)]
+    for c in range(3):
+        middle = 0.0
+        for k in used:
+            middle += value[w + 8 * np.int64(k)] / total * places[k, c]
+        for k in used:
+            away[k, c] = places[k, c] - middle
+
+
+@kernel
+def _balance_vertex(w, lane, first, end, step, slope, entry_row, packed_slope, away):
+    """Round the derivatives of one vertex in one direction, whose entries are ``first`` to ``end``, so that the sum of
+    their errors times ``away (rows, 3)`` is short; ``w`` : where they start in ``slope``, sixteen apart."""
+    x, y, z = 0.0, 0.0, 0.0
+    for e in range(first, end):
+        k = np.int64(entry_row[e])
+        error = step * packed_slope[16 * e + lane] - slope[w + 16 * k]
+        x, y, z = x + error * away[k, 0], y + error * away[k, 1], z + error * away[k, 2]
+    for _ in range(BALANCE_ROUNDS):
+        for e in range(first, end):
+            k = np.int64(entry_row[e])
+            error = step * packed_slope[16 * e + lane] - slope[w + 16 * k]
+            turn = -step if error > 0.0 else step
+            nx, ny, nz = x + turn * away[k, 0], y + turn * away[k, 1], z + turn * away[k, 2]
+            if error != 0.0 and nx * nx + ny * ny + nz * nz < x * x + y * y + z * z:
+                packed_slope[16 * e + lane] += -1 if error > 0.0 else 1
+                x, y, z = nx, ny, nz

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surface.base.arrays import Bools, Ints
+from surface.base.arrays import Bools, Floats, Ints
 from surface.mesh.mesh import Mesh
 
 from .factors import Factors, expand_factors, factorize
@@ -41,11 +41,14 @@ class Storage(NamedTuple):
         return held
 
 
-def compress(basis: Basis, lists: Lists, mesh: Mesh) -> Storage:
-    """Choose how each cell's weights are kept; ``lists`` has blocks only of the cells that keep them."""
+def compress(basis: Basis, lists: Lists, mesh: Mesh, points: Floats) -> Storage:
+    """Choose how each cell's weights are kept; ``lists`` has blocks only of the cells that keep them.
+
+    points : (b n, 3) the control points and their shifted copies.
+    """
     order = order_vertices(lists)
     factors = factorize(basis, lists, mesh, order.entries)
-    made = Storage(factors, pack(lists, order, factors.rows_at < 0))
+    made = Storage(factors, pack(lists, order, factors.rows_at < 0, points))
     _take_out(lists, made.blocks(np.arange(len(lists.rows))))
     return made
 

@@ -27,7 +27,7 @@ def check(deformation: Deformation[DCPSurface]) -> None:
     points, normals, size = fresh(deformation)
     assert np.abs(deformation.vertices - points).max() < 1e-6 * SIZE
     error = np.abs(deformation.normals - normals).max(axis=1)
-    assert (error * np.minimum(1, size / np.median(size))).max() < 1e-4  # random moves fold the sheet here and there
+    assert (error * np.minimum(1, size / np.median(size))).max() < 2e-4  # random moves fold the sheet here and there
 
 
 def interior(surface: DCPSurface, i: int) -> int:

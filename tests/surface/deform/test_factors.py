@@ -29,7 +29,7 @@ def weighted_sheet() -> tuple[DCPSurface, Mesh]:
 
 def factored(surface: DCPSurface, mesh: Mesh) -> tuple[Lists, Storage]:
     lists = build_lists(surface, mesh, True)
-    return lists, compress(Basis.of(surface), lists, mesh)
+    return lists, compress(Basis.of(surface), lists, mesh, surface.arrays()[4])
 
 
 def test_factors_give_the_weights_of_the_surface() -> None:

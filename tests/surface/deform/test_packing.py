@@ -21,7 +21,8 @@ def body(count: int = 60) -> tuple[DCPSurface, Mesh]:
 
 def packed(lists: Lists) -> tuple[packing.Order, packing.Packed]:
     order = packing.order_vertices(lists)
-    return order, packing.pack(lists, order, np.ones(len(lists.rows), np.bool_))
+    points = np.random.default_rng(5).normal(size=(int(lists.ids.max()) + 1, 3))
+    return order, packing.pack(lists, order, np.ones(len(lists.rows), np.bool_), points)
 
 
 @pytest.mark.parametrize("normals", [True, False])
@@ -38,7 +39,32 @@ def test_unpacked_blocks_are_the_blocks_that_were_packed(normals: bool) -> None:
         if normals:
             slopes = lists.slope[2 * lists.at[c] :][: 2 * size].reshape(-1, 2, LANES)
             steps = made.slope_step[made.packed_at[c] :][: lists.tile_start[c + 1] - lists.tile_start[c]].max(axis=0)
-            assert (np.abs(blocks[1].reshape(slopes.shape) - slopes) <= 0.51 * steps[:, None]).all()
+            assert (np.abs(blocks[1].reshape(slopes.shape) - slopes) <= 1.01 * steps[:, None]).all()
+
+
+def missed_derivatives(lists: Lists, surface: DCPSurface) -> np.ndarray:
+    """(k,) how far the derivatives of the surface at vertices of packed cells are off, in u and in v."""
+    order = packing.order_vertices(lists)
+    made, out = packing.pack(lists, order, np.ones(len(lists.rows), np.bool_), surface.points), []
+    for c in np.flatnonzero(made.packed_at >= 0):
+        weights, slopes = packing.unpack_cell(lists, made, int(c))
+        wanted = lists.slope[2 * lists.at[c] :][: slopes.size].reshape(*slopes.shape[:2], 2, LANES)
+        errors = slopes.reshape(wanted.shape) - wanted
+        places = surface.points[lists.ids[lists.ids_at[c] :][: lists.rows[c]]]
+        vertices = np.einsum("trl,rc->tlc", weights, places) / weights.sum(axis=1)[..., None].clip(1e-30)
+        away = places[None, :, None] - vertices[:, None]  # (t, r, l, c)
+        out.append(np.linalg.norm(np.einsum("trql,trlc->tqlc", errors, away), axis=-1).ravel())
+    return np.concatenate(out)
+
+
+def test_derivatives_are_rounded_so_that_those_of_the_surface_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    surface, mesh = body()
+    lists = build_lists(surface, mesh, True)
+    chosen = missed_derivatives(lists, surface)
+    monkeypatch.setattr(packing, "_balance", lambda *_: None)  # each to the nearest step
+    nearest = missed_derivatives(lists, surface)
+    assert np.sqrt((chosen**2).mean()) < 0.7 * np.sqrt((nearest**2).mean()) > 0.0
+    assert (chosen <= nearest + 1e-12).all()
 
 
 def test_no_entry_is_all_zero_and_every_row_knows_its_entries() -> None:
@@ -89,7 +115,7 @@ def test_cells_without_zeros_keep_blocks() -> None:
     lists.value[:8] = 0.0
     order, made = packed(lists)
     assert order.entries.tolist() == [7] and made.packed_at.tolist() == [0] and not order.moved.any()
-    none = packing.pack(lists, order, np.zeros(1, np.bool_))
+    none = packing.pack(lists, order, np.zeros(1, np.bool_), np.zeros((4, 3)))
     assert none.packed_at.tolist() == [packing.PLAIN] and none.nbytes == 3 * 8
 
 

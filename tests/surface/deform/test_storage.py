@@ -27,7 +27,7 @@ def body() -> tuple[DCPSurface, Mesh]:
 def compressed(body: tuple[DCPSurface, Mesh], normals: bool) -> tuple[Lists, Storage]:
     surface, mesh = body
     lists = build_lists(surface, mesh, normals)
-    return lists, compress(Basis.of(surface), lists, mesh)
+    return lists, compress(Basis.of(surface), lists, mesh, surface.arrays()[4])
 
 
 def blocks_of(lists: Lists, c: int) -> np.ndarray:
@@ -77,7 +77,7 @@ def test_blocks_come_back_as_they_were(body: tuple[DCPSurface, Mesh], normals: b
         found, wanted = blocks_of(lists, c), blocks_of(plain, c)
         assert np.abs(found - wanted)[..., 0].max() <= 4e-7 * np.abs(wanted).max(), c
         most = np.abs(wanted).max(axis=(0, 1))  # derivatives of packed cells are kept in 16 bits
-        assert (np.abs(found - wanted).max(axis=(0, 1)) <= 2e-5 * most).all(), c
+        assert (np.abs(found - wanted).max(axis=(0, 1)) <= 4e-5 * most).all(), c
     for c, block in kept.items():
         assert np.array_equal(blocks_of(lists, c), block)
 
