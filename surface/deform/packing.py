@@ -27,7 +27,8 @@ from .lists import LANES, Lists
 PLAIN = -1  # in ``packed_at``: the cell is not packed; in ``order_at``: its lanes follow the mesh's order
 CANDIDATES = 64  # vertices, the next ones in the mesh's order, among which the next one of a tile is chosen
 MAX_REMAINING = 0.97  # fraction of rows that reordering may leave; if it leaves more, vertices stay in order
-MAX_STEPS = 32767
+MAX_STEPS = 32766  # of the largest derivative; rounding may add one, and 16 bits hold 32767
+MIN_SLOPE = 1e-30  # a smaller largest one counts as 0: its step would leave the range of float32
 BALANCE_ROUNDS = 2  # of choosing how derivatives are rounded
 MAX_ROWS = 1 << 16  # rows or vertices of a cell that can be packed: their numbers are uint16
 
@@ -267,16 +268,16 @@ def _read_row(first, count, k, rows, at, value, slope, order_at, order, own):
 
 @kernel
 def _choose_steps(first, count, rows, at, slope, order_at, order, step):
-    """Set ``step (2,)`` so that the largest derivatives in u and in v of ``count`` lanes from ``first`` are 32767 of
-    them; 1 where all are zero."""
+    """Set ``step (2,)`` so that the largest derivatives in u and in v of ``count`` lanes from ``first`` are MAX_STEPS
+    of them; 1 where all are zero."""
     most_u, most_v = 0.0, 0.0
     for j in range(first, first + count):
         s = np.int64(order[order_at + j]) if order_at >= 0 else j
         for k in range(rows):
             w = 2 * (at + ((s // 8) * rows + k) * 8) + s % 8
             most_u, most_v = max(most_u, abs(slope[w])), max(most_v, abs(slope[w + 8]))
-    step[0] = most_u / MAX_STEPS if most_u > 0.0 else 1.0
-    step[1] = most_v / MAX_STEPS if most_v > 0.0 else 1.0
+    step[0] = most_u / MAX_STEPS if most_u > MIN_SLOPE else 1.0
+    step[1] = most_v / MAX_STEPS if most_v > MIN_SLOPE else 1.0
 
 
 @kernel
@@ -343,7 +344,8 @@ def _from_vertex(w, used, value, places, away):
     for c in range(3):
         middle = 0.0
         for k in used:
-            middle += value[w + 8 * np.int64(k)] / total * places[k, c]
+            if total > 0.0:  # else the mesh is refused later
+                middle += value[w + 8 * np.int64(k)] / total * places[k, c]
         for k in used:
             away[k, c] = places[k, c] - middle
 

@@ -67,6 +67,18 @@ def test_derivatives_are_rounded_so_that_those_of_the_surface_stay(monkeypatch: 
     assert (chosen <= nearest + 1e-12).all()
 
 
+def test_the_largest_derivatives_stay_within_16_bits_whichever_way_they_are_rounded() -> None:
+    lists, rng = one_cell(), np.random.default_rng(3)
+    lists.value[:32] = 1.0  # of the second tile no point reaches a vertex: nothing is divided by nothing
+    lists.slope = rng.uniform(-1, 1, 128).astype(np.float32)
+    lists.slope[::3] = np.float32(1.0)
+    lists.slope[64:80] = 0.0  # a row of zeros, without which the cell would keep its block
+    for scale in (1.0, 1e-32):
+        lists.slope *= np.float32(scale)
+        _, made = packed(lists)
+        assert np.abs(made.packed_slope.astype(int)).max() == (packing.MAX_STEPS if scale == 1.0 else 0)
+
+
 def test_no_entry_is_all_zero_and_every_row_knows_its_entries() -> None:
     lists = build_lists(*body(), False)
     order, made = packed(lists)
