@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from surface.head.model.look import Colour, Look, Worn  # imported lazily: the body draws nothing
 
 HexColour = Annotated[str, Field(pattern=r"^#[0-9a-fA-F]{6}$")]
+Depth = Annotated[Number, Field(ge=0, le=2)]
 PersonName = str | dict[str, Fraction]
 WORN = ("hair", "beard", "clothes")
 PERSON_HINT = "--person maple, or --person maple=0.5,oak=0.5"
@@ -32,6 +33,7 @@ class SkinSettings(Settings):
     redness: Annotated[Number, Field(ge=0, le=2)] = 1.0
     freckles: Fraction = 0.0
     age: Fraction = 0.0
+    forehead: tuple[Depth, Depth, Depth] = (1.0, 1.0, 1.0)
     lips: HexColour | None = None
 
 
@@ -85,6 +87,7 @@ class PersonSettings(Settings):
             redness=skin.redness,
             freckles=skin.freckles,
             age=skin.age,
+            forehead=skin.forehead,
             lips=linear(skin.lips),
             iris=linear(self.eyes.iris),
             brow=linear(self.brows.colour),

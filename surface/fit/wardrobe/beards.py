@@ -15,9 +15,9 @@ from surface.fit.wardrobe.styles import BARE, step
 #: By the angle from the front, degrees, about the vertical through (0, 20): the beard's upper and lower line, mm, and
 #: the upper line of its part below the mouth.
 _ANGLES = np.array([0.0, 8.0, 15.0, 20.0, 24.0, 32.0, 45.0, 60.0, 75.0, 87.0, 95.0])
-_UPPER = np.array([-13.0, -12.0, -13.0, -16.5, -22.0, -27.5, -31.0, -25.0, -8.0, 12.0, 14.0])
+_UPPER = np.array([-13.0, -12.0, -13.0, -15.5, -18.5, -22.0, -26.0, -23.0, -8.0, 12.0, 14.0])
 _LOWER = np.array([-94.0, -94.0, -93.0, -92.0, -90.0, -88.0, -84.0, -76.0, -60.0, -32.0, -4.0])
-_BELOW = np.array([-44.0, -44.0, -42.0, -36.0, -28.0, -27.5, -31.0, -25.0, -8.0, 12.0, 14.0])
+_BELOW = np.array([-42.0, -42.0, -41.0, -34.0, -25.0, -23.0, -26.0, -23.0, -8.0, 12.0, 14.0])
 _LIP = np.array([-23.5, -24.0, -26.0, -29.3, -33.2])  # lower line of the moustache, at the first five angles: it ends
 # level with the corners of the mouth, since one that hangs over them makes every face look sad
 _EDGE_DEG = 90.0
@@ -26,8 +26,12 @@ _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips i
 _LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
 _FIELD_MM = -7.0, 11.0  # inside the beard's lines: where stubble begins, and where it is dense
 _DENSER = 1.3  # hair over the lip, which is too short to lie over what is beside it
-_LIP_MM = 1.6  # inside its lines, where that is dense
-_SIDE_DEG, _SIDE = (60.0, 88.0), 0.85  # between which it gets shorter towards the ear, and by which share
+_WIDE_MM = 9.0  # inside its lines, where a beard is dense
+_LIP_MM = 1.6  # the same over the lip
+_FAN = 0.3  # by how much narrower the moustache's roots lie than its tips: hairs lie outwards from the middle
+_BEHIND = 0.8  # mm inside the beard's end at the ear for a degree: there it thins out slowly
+_UNEVEN_MM, _UNEVEN_DEG = 1.6, 3.1  # by how much the line at which hairs begin wanders, and how fast
+_SIDE_DEG, _SIDE = (45.0, 86.0), 0.85  # between which it gets shorter towards the ear, and by which share
 _HAIRS = 1.0 / 26.0  # tiles of the noise for a mm across hairs
 _ROOTS_MM, _SHORTER = 7.0, 10.0  # from a shell's upper line, where hairs are seen in so many times shorter pieces
 
@@ -45,7 +49,7 @@ class Beard:
 
 
 BEARDS = {
-    "beard-full": Beard(5.0, 7.0, ((1.0, 0.46), (0.72, 0.62), (0.40, 0.85)), 0.85, 210.0),
+    "beard-full": Beard(4.4, 7.0, ((1.0, 0.46), (0.72, 0.62), (0.40, 0.85)), 0.85, 210.0),
     "beard-short": Beard(1.7, 0.6, ((1.0, 0.40), (0.5, 0.50)), 0.62, 64.0),
 }
 
@@ -54,9 +58,11 @@ def inside(points: Floats) -> Floats:
     """(n,) how far inside the beard's lines places on the face (n, 3) lie, mm; negative outside."""
     y, z, angle = points[:, 1], points[:, 2], _angle(points)
     upper, lower = np.interp(angle, _ANGLES, _UPPER), np.interp(angle, _ANGLES, _LOWER)
-    out = np.linalg.norm((points[:, :2] - _LIPS) / _LIP_RADII, axis=1)
-    lips = np.where(z > _MOUTH_DEPTH, 11.0 * (out - 1.0), 50.0)
-    return np.asarray(np.minimum.reduce([upper - y, y - lower, lips, 1.3 * (_EDGE_DEG - 2.0 - angle)]))
+    away = points[:, :2] - _LIPS
+    out = np.maximum(np.linalg.norm(away / _LIP_RADII, axis=1), 1e-6)
+    beside = np.linalg.norm(away, axis=1) * (1.0 - 1.0 / out)
+    lips = np.where(z > _MOUTH_DEPTH, np.where(out < 1.0, _LIP_RADII[1] * (out - 1.0), beside), 50.0)
+    return np.asarray(np.minimum.reduce([upper - y, y - lower, lips, _BEHIND * (_EDGE_DEG - 2.0 - angle)]))
 
 
 def _angle(points: Floats) -> Floats:
@@ -69,23 +75,25 @@ def garment(skin: Skin, beard: Beard) -> list[Patches]:
     wide = _EDGE_DEG * (1.0 - 2.0 * greville(31, 2))  # so that the outside is outside
     main = _grid(skin, wide, np.interp(np.abs(wide), _ANGLES, _BELOW), np.interp(np.abs(wide), _ANGLES, _LOWER), 11)
     narrow = 25.0 * (1.0 - 2.0 * greville(13, 2))
-    top = np.interp(np.abs(narrow), _ANGLES, _UPPER)
-    lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _ANGLES[:5], _LIP), 5)
+    top = np.interp((1.0 - _FAN) * np.abs(narrow), _ANGLES, _UPPER)
+    lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _ANGLES[:5], _LIP), 5, _FAN)
     out = []
     for k, (share, cover) in enumerate(beard.shells):
-        out.append(_shell(skin, beard, main, (43, 13), (23, 7), share, cover, k, 9.0, over_lip=False))
+        out.append(_shell(skin, beard, main, (43, 13), (23, 7), share, cover, k, _WIDE_MM, over_lip=False))
         out.append(_shell(skin, beard, lip, (19, 6), (10, 4), share, _DENSER * cover, k, _LIP_MM, over_lip=True))
     return out
 
 
-def _grid(skin: Skin, angles: Floats, upper: Floats, lower: Floats, rows: int) -> Floats:
+def _grid(skin: Skin, angles: Floats, upper: Floats, lower: Floats, rows: int, fan: float = 0.0) -> Floats:
     """(columns, rows, 3) places on the skin between two lines, down each column where control points
-    act most."""
+    act most; columns begin nearer to the middle by the share ``fan`` of their angle."""
     columns = []
     for angle, top, bottom in zip(np.radians(angles), upper, lower, strict=True):
-        direction = np.array([np.sin(angle), 0.0, np.cos(angle)])
-        heights = np.linspace(top, bottom, 40)
-        columns.append(np.array([_outermost(skin, y, direction) for y in heights]))
+        t = np.linspace(0.0, 1.0, 40)
+        at = angle * (1.0 - fan * (1.0 - t))
+        directions = np.column_stack([np.sin(at), np.zeros_like(at), np.cos(at)])
+        heights = top + t * (bottom - top)
+        columns.append(np.array([_outermost(skin, y, each) for y, each in zip(heights, directions, strict=True)]))
     return resampled(np.array(columns), rows, greville(rows, 2))
 
 
@@ -132,6 +140,8 @@ def _shell(
     if over_lip:
         openness = 0.75 * openness
         reached = reached * step(np.minimum(s, 1.0 - s), 0.0, 0.14) * (1.0 - 0.8 * step(t, 0.65, 1.0))
+    else:
+        reached = reached * step(t, 0.0, 0.1)
     along = (t * length - _ROOTS_MM * _SHORTER * np.exp(-t * length / _ROOTS_MM)) / beard.grain
     strands = np.stack(
         [s * width * _HAIRS + 0.31 * layer, along, cover * reached - BARE * (1.0 - reached), openness], axis=-1
@@ -146,12 +156,19 @@ def _shell(
 def _reached(places: Floats, full_mm: float, share: float) -> Floats:
     """(n,) how much of a shell's hairs grow at places on the skin (n, 3): fewer towards the beard's lines, and the
     longer they are, the later; over the lip fewer towards the corners of the mouth and below the nose's middle."""
-    deep = inside(places) - _LATER * full_mm * share
+    deep = inside(places) - _LATER * full_mm * share + min(1.0, full_mm / _WIDE_MM) * _wandering(places)
     out = step(deep, -0.3 * full_mm, 1.2 * full_mm)
     x, y, z = places.T
     lip = step(y, -36.0, -30.0) * step(z, 70.0, 80.0)
     thinner = 0.3 * step(np.abs(x), 18.0, 31.0) + 0.2 * np.exp(-((x / 2.0) ** 2))
     return np.asarray(out * (1.0 - lip * thinner))
+
+
+def _wandering(places: Floats) -> Floats:
+    """(n,) mm by which hairs begin later or sooner at places (n, 3), differently on either side: a beard's line that is
+    the same distance from lips and cheeks all along looks cut out."""
+    angle = np.degrees(np.arctan2(places[:, 0], places[:, 2] - 20.0)) / _UNEVEN_DEG
+    return np.asarray(_UNEVEN_MM * (0.6 * np.sin(angle) + 0.5 * np.sin(2.3 * angle + 1.0) + 0.4 * np.sin(4.1 * angle)))
 
 
 def _between(rows: Floats, at_u: Floats, at_v: Floats) -> Floats:

@@ -28,6 +28,22 @@ _TRUNK = np.array(
     ]
 )
 _ROUND = 2.6  # exponent of the trunk's section, a superellipse
+#: Rows of a collar that is rolled down, from inside it over the rim to below its fold: share of its height, mm
+#: outwards, shares of its roll outwards and up, and how open the cloth lies there.
+_ROLLED = np.array(
+    [
+        (0.60, -1.6, 0.00, 0.00, 0.40),
+        (0.90, -1.2, 0.00, 0.00, 0.50),
+        (1.00, -0.4, 0.20, 0.35, 0.80),
+        (1.00, 0.0, 0.75, 0.30, 1.00),
+        (0.88, 0.0, 1.15, 0.00, 1.00),
+        (0.60, 0.0, 1.30, 0.00, 1.00),
+        (0.34, 0.0, 1.35, 0.00, 0.95),
+        (0.20, 0.0, 1.15, 0.00, 0.80),
+        (0.17, 0.0, 0.45, 0.00, 0.50),
+        (0.10, 0.0, 0.15, 0.00, 0.55),
+    ]
+)
 
 
 @dataclass(frozen=True)
@@ -35,6 +51,7 @@ class Neck:
     """A neck line: its height in front, at the side and behind, mm, and how far the cloth stands off the neck.
 
     stand : height of a collar over the line, mm; lean : how far its rim leans outwards. fold : does it fold back?
+    roll : how far a collar that is rolled down stands out beyond its inside, mm; 0 where it is not.
     """
 
     front: float
@@ -44,11 +61,12 @@ class Neck:
     stand: float = 0.0
     lean: float = 0.0
     fold: bool = False
+    roll: float = 0.0
 
 
 NECKS = {
     "clothes-crew": Neck(-126.0, -100.0, -86.0, 2.5, 7.0, 1.0),
-    "clothes-turtleneck": Neck(-110.0, -96.0, -81.0, 3.5, 25.0, 2.0),
+    "clothes-turtleneck": Neck(-110.0, -96.0, -81.0, 3.5, 25.0, 2.0, roll=3.4),
     "clothes-shirt": Neck(-122.0, -98.0, -84.0, 4.0, 22.0, 5.0, fold=True),
 }
 
@@ -58,12 +76,29 @@ def garment(skin: Skin, neck: Neck) -> list[Patches]:
     nu = 40
     angle = np.linspace(np.pi, -np.pi, nu)  # from behind round the left; 0 is in front
     ring = _ring(skin, neck, angle)
-    rows = [*_collar(skin, ring, neck), *_trunk(skin, ring, angle)]
-    points = np.stack(rows, axis=1)
-    out = [_patch(points, (73, 25), (41, 13), inner=len(_collar(skin, ring, neck)))]
+    collar, trunk = _collar(skin, ring, neck), _trunk(skin, ring, angle)
+    points = _closed(np.stack([*collar, *trunk], axis=1))
+    if neck.roll > 0.0:
+        openness = np.concatenate([_ROLLED[:, 4], np.linspace(0.75, 1.0, 3), np.ones(len(trunk) - 3)])
+        return [_patch(points, (73, 33), (41, 17), openness)]
+    out = [_patch(points, (73, 25), (41, 13), _dark_within(len(collar), points.shape[1]))]
     if neck.fold:
-        out.insert(0, _patch(np.stack(_folded(skin, ring, angle), axis=1), (73, 7), (41, 4), inner=1))
+        folded = _closed(np.stack(_folded(skin, ring, angle), axis=1))
+        out.insert(0, _patch(folded, (73, 7), (41, 4), _dark_within(1, folded.shape[1])))
     return out
+
+
+def _closed(points: Floats) -> Floats:
+    """Points (nu, nv, 3) whose first and last columns lie half way between their neighbours, else the cloth has an edge
+    down the back where it is closed."""
+    out = points.copy()
+    out[0] = out[-1] = 0.5 * (points[1] + points[-2])
+    return out
+
+
+def _dark_within(inner: int, rows: int) -> Floats:
+    """(k,) how open cloth lies from row to row, of which the first ``inner`` lie inside the collar."""
+    return 0.45 + 0.55 * step(np.linspace(0.0, 1.0, 8 * rows), 0.0, 1.5 * inner / rows)
 
 
 def _ring(skin: Skin, neck: Neck, angle: Floats) -> Floats:
@@ -107,6 +142,9 @@ def _collar(skin: Skin, ring: Floats, neck: Neck) -> list[Floats]:
     if neck.stand > 12.0:  # the neck is narrower there
         normals, height = skin.nearest(rim)
         rim = _smooth(rim + (neck.off + 0.5 * neck.lean - height)[:, None] * unit(normals * (1.0, 0.3, 1.0)))
+    if neck.roll > 0.0:
+        return [line + h * (rim - line) + (away + out * neck.roll) * level + over * neck.roll * up
+                for h, away, out, over, _ in _ROLLED]  # fmt: skip
     inside, lip = rim - 1.6 * level - 9.0 * unit(rim - line), rim - 0.8 * level  # along the collar, which leans
     return [inside, lip, rim + 1.0 * up, rim + 1.2 * level - 1.0 * up, 0.5 * (rim + line) + 0.8 * level]
 
@@ -155,12 +193,12 @@ def _folded(skin: Skin, ring: Floats, angle: Floats) -> list[Floats]:
     return [rows[0], rows[1], *(_clear(skin, _smooth(row, 1), 5.5) for row in rows[2:])]
 
 
-def _patch(points: Floats, grid: tuple[int, int], fast: tuple[int, int], inner: int) -> Patches:
-    """One patch of cloth; the first ``inner`` rows lie inside the collar, in the dark."""
+def _patch(points: Floats, grid: tuple[int, int], fast: tuple[int, int], open_along: Floats) -> Patches:
+    """One patch of cloth; ``open_along`` : (k,) how open it lies, evenly along v."""
     nu, nv, _ = points.shape
     gu, gv = grid
     s, t = np.meshgrid(np.linspace(0, 1, gu), np.linspace(0, 1, gv), indexing="ij")
-    openness = 0.45 + 0.55 * step(t, 0.0, 1.5 * inner / nv)
+    openness = np.interp(t, np.linspace(0.0, 1.0, len(open_along)), open_along)
     strands = np.stack([s * 700 * THREADS, t * 260 * THREADS, np.ones_like(t), openness], axis=-1)
     zero = np.zeros((1, gu, gv))
     return Patches(points[None], (3, 3), grid, fast, strands[None], zero, zero + 1.0, np.zeros((1, nu, nv)), 0.0)

@@ -9,9 +9,10 @@ from surface.fit.wardrobe.guides import Thickness
 from surface.fit.wardrobe.hairline import Hairline
 from surface.fit.wardrobe.patches import Patches
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import BARE, Style, cap, step
+from surface.fit.wardrobe.styles import BARE, Style, cap, denser, step
 
 _CURL = 1.0 / 30.0  # tiles of the noise for a mm: curls of a few mm
+_ROUND_MM = 44.0  # inside the line, over which a cloud of curls grows round
 _STEADY = 0.2  # of the shader strand.frag, which stretches the noise along strands by its reciprocal
 
 
@@ -22,7 +23,8 @@ def crop(skin: Skin) -> Style:
     def thickness(at: Floats) -> Floats:
         return np.asarray(0.6 + (3.2 + 2.4 * step(at[:, 1], 60.0, 125.0)) * step(line.inside(at), -3.0, 22.0))
 
-    return Style(_shells(skin, line, thickness, ((1.0, 0.52), (0.72, 0.80), (0.45, 1.4)), 1.5), line)
+    layers = (1.0, 0.52), (0.72, 0.80), (0.45, 1.4)
+    return Style(_shells(skin, line, thickness, layers, short_mm=1.5, fade=0.91), line)
 
 
 def afro(skin: Skin) -> Style:
@@ -30,24 +32,29 @@ def afro(skin: Skin) -> Style:
     line = Hairline(skin)
 
     def thickness(at: Floats) -> Floats:
-        full = 27.0 - 3.0 * step(at[:, 1], 60.0, 130.0)
-        return np.asarray(1.0 + full * step(line.inside(at), -6.0, 46.0))
+        full = 8.0 + 15.0 * step(at[:, 1], 15.0, 95.0)  # close round the ears and at the nape
+        within = np.clip(line.inside(at) / _ROUND_MM, 0.0, 1.0)
+        return np.asarray(0.8 + full * within * (2.0 - within))  # rises at once, at half a right angle: no brim
 
-    return Style(_shells(skin, line, thickness, ((1.0, 0.42), (0.94, 0.60), (0.86, 1.4)), 0.5), line)
+    layers = (1.0, 0.42), (0.94, 0.60), (0.86, 1.4)
+    return Style(_shells(skin, line, thickness, layers, short_mm=0.5, fade=0.95, dense=0.45), line)
 
 
 def _shells(
-    skin: Skin, line: Hairline, thickness: Thickness, layers: tuple[tuple[float, float], ...], short_mm: float
-) -> list[Patches]:
-    """Closed patches one over the other, the outermost first, each with a share of the thickness and its cover."""
+    skin: Skin, line: Hairline, thickness: Thickness, layers: tuple[tuple[float, float], ...], *, short_mm: float,
+    fade: float, dense: float = 0.0,
+) -> list[Patches]:  # fmt: skip
+    """Closed patches one over the other, the outermost first, each with a share of the thickness and its cover, which
+    fades from a share of the way to the line on: what fades where it stands off the skin is seen through."""
     out = []
     for k, (share, cover) in enumerate(layers):
-        own = cap(skin, line, thickness, share=share, short_mm=short_mm, openness=1.0 - 0.22 * k)
+        own = cap(skin, line, thickness, share=share, short_mm=short_mm, openness=1.0 - 0.22 * k, dense=dense)
         strands = own.strands.copy()
         u, v = strands[..., 0] / strands[..., 0].max(), np.linspace(0.0, 1.0, strands.shape[2])[None, None]
+        way = denser(v, dense)
         around = 520.0 * np.sin(np.minimum(1.75 * v, 0.5 * np.pi))  # mm round the head there
         strands[..., 0] = np.rint(520.0 * _CURL) * u + 0.37 * k + 0.0 * around
         strands[..., 1] = 150.0 * v * _CURL / _STEADY + 0.21 * k
-        strands[..., 2] = cover - (cover + BARE) * step(v, 0.91, 1.0)
+        strands[..., 2] = cover - (cover + BARE) * step(way, fade, 1.0)
         out.append(Patches(own.points, own.degrees, own.grid, own.fast, strands, own.tint, own.shade, own.sway))
     return out

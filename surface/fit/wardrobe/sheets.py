@@ -17,7 +17,7 @@ from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import Flow, Thickness, grow, resampled
 from surface.fit.wardrobe.patches import Patches, greville, knots
 from surface.fit.wardrobe.skin import Skin, unit
-from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, step
+from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, denser, step
 
 _CLOSER = 0.45  # how much less light reaches cropped hairs, which lie on the skin
 _CROPPED = 20.0  # how many times shorter the pieces are that one sees of cropped hairs
@@ -88,7 +88,7 @@ class Weave:
 
     def length(self, v: Floats) -> Floats:
         """Share of strands' length that lies before v."""
-        return np.asarray(v + self.dense * v * (1.0 - v))
+        return denser(v, self.dense)
 
 
 def sheets(

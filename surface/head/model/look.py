@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from surface.base.arrays import Floats
-from surface.head.model.data import HeadData
+from surface.base.arrays import Floats, Floats32
+from surface.head.model.data import HeadData, PartData
 
 Colour = tuple[float, float, float]
 
@@ -28,6 +28,8 @@ OWN_MELANIN = 0.2
 BLOOD = np.array((0.05, 0.34, 0.26))
 _AGED = {"wrinkleForehead": 0.75, "wrinkleFrown": 0.50, "wrinkleEye": 0.80, "wrinkleCheek": 0.90}
 """Amount of a wrinkle at rest at the age of 1, by the beginning of its group's name."""
+_FOREHEAD = "wrinkleForehead"  # with which the names of groups begin whose lines a look has in depths of its own
+_APART = 2.5  # of the usual distance of a group's points in order: where they are further apart, another line begins
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,7 @@ class Look:
     redness : how much lips, cheeks, nose and ears differ from the rest, 1 as painted.
     freckles : 0 none to 1 many.
     age : 0 young to 1 with deep wrinkles at rest.
+    forehead : how deep raised brows fold each line of the forehead, the lowest first; 1 as the head has it.
     lips : colour of lips. iris, brow : colours. brow_strength : how dense brows are, 1 as they are.
     worn : what is put on the head.
     """
@@ -62,6 +65,7 @@ class Look:
     redness: float = 1.0
     freckles: float = 0.0
     age: float = 0.0
+    forehead: tuple[float, float, float] = (1.0, 1.0, 1.0)
     lips: Colour | None = None
     iris: Colour | None = None
     brow: Colour | None = None
@@ -109,3 +113,32 @@ def with_age(head: HeadData, age: float) -> HeadData:
                 np.add.at(points, group.ids, share * group.moves)
         parts.append(replace(part, points=points))
     return replace(head, parts=parts)
+
+
+def with_forehead(head: HeadData, depths: tuple[float, ...]) -> HeadData:
+    """Return the head with each line of its forehead as deep as ``depths`` say, the lowest first; lines above those
+    that are named are as deep as the last one."""
+    if set(depths) == {1.0}:
+        return head
+    return replace(head, parts=[_with_lines(part, depths) for part in head.parts])
+
+
+def _with_lines(part: PartData, depths: tuple[float, ...]) -> PartData:
+    groups = [
+        replace(group, moves=_deepened(part.points[group.ids], group.moves, depths))
+        if group.name.startswith(_FOREHEAD) and len(group.ids)
+        else group
+        for group in part.groups
+    ]
+    return replace(part, groups=groups)
+
+
+def _deepened(points: Floats, moves: Floats32, depths: tuple[float, ...]) -> Floats32:
+    """Return moves (k, 3) of points (k, 3), which follow each other along one line after the other, by line."""
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    usual = float(np.median(steps)) if len(steps) else 0.0
+    line = np.concatenate([[0], np.cumsum(steps > _APART * usual)])
+    height = np.array([points[line == k, 1].mean() for k in range(line[-1] + 1)])
+    rank = np.argsort(np.argsort(height))
+    share = np.array(depths)[np.minimum(rank, len(depths) - 1)]
+    return np.asarray(share[line][:, None] * moves, np.float32)

@@ -19,6 +19,10 @@ from surface.head.posing.part import HeadPart, Turn
 COVERED = 0.5  # of the picture of hidden skin: more is not drawn
 SCALP = 0.6  # of hair's colour on the skin between its roots, where little light reaches
 ALONG_MM = 900.0  # of strands for a tile of their texture along them, as surface.fit.wardrobe makes them
+SHADED = 0.6  # of the light that falls on skin between roots, what hair keeps from it: else it shines grey
+CURLED_MM = (
+    40.0  # of strands for a tile of their texture: where it is shorter, strands turn, and none has one direction
+)
 THROUGH = 0.8  # of the skin between roots of hair that is light, which lets light through and shows less on it
 
 
@@ -78,7 +82,17 @@ def _directions(part: HeadPart) -> Floats32:
     """Return (m, 3): unit vectors along the strands at rest: those of v."""
     _, _, along = part.surface.derivatives(part.mesh.uv, side=part.mesh.side)
     length = np.linalg.norm(along, axis=1, keepdims=True)
-    return np.asarray(along / np.maximum(length, 1e-9), np.float32)
+    return np.asarray(_straightness(part) * along / np.maximum(length, 1e-9), np.float32)
+
+
+def _straightness(part: HeadPart) -> float:
+    """Return 1 of straight strands, and less of curls, whose texture changes along them within a few mm."""
+    within = np.diff(part.mesh.uv[:, 0]) == 0.0
+    steps = np.linalg.norm(np.diff(part.vertices, axis=0), axis=1)[within]
+    tiles = np.abs(np.diff(part.attributes["strands"][:, 1]))[within]
+    if not tiles.any():
+        return 1.0
+    return float(min(1.0, steps.sum() / tiles.sum() / CURLED_MM))
 
 
 def _colour_below(part: HeadPart, garments: Sequence[Garment]) -> None:
@@ -90,7 +104,10 @@ def _colour_below(part: HeadPart, garments: Sequence[Garment]) -> None:
         if cover is not None:
             below = SCALP * np.asarray(garment.worn.colour, np.float32)
             darker = np.clip(1.0 - below.mean() / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3), 0.0, 1.0)
-            albedo = albedo + cover * (1.0 - THROUGH * (1.0 - darker)) * (below - albedo)
+            share = cover * (1.0 - THROUGH * (1.0 - darker))
+            albedo = albedo + share * (below - albedo)
+            if "occlusion" in part.attributes:
+                part.attributes["occlusion"] = part.attributes["occlusion"] * (1.0 - SHADED * share)
         shadow = sample_picture(garment, "shadow", part)
         if shadow is not None and "occlusion" in part.attributes:
             part.attributes["occlusion"] = part.attributes["occlusion"] * (1.0 - shadow)

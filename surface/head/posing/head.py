@@ -15,7 +15,7 @@ from surface.head.model.data import Contact, Group, HeadData, PartData
 from surface.head.model.file import load_data
 from surface.head.model.identity import load_identities, with_identities
 from surface.head.model.light import LightPoints, Refined, with_light
-from surface.head.model.look import Look, with_age
+from surface.head.model.look import Look, with_age, with_forehead
 from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.head.model.own_groups import OwnAmounts, OwnGroup, OwnMoves
 from surface.head.model.parameters import NAMES, SHAPES, Pose, read_pose, rotation
@@ -211,10 +211,11 @@ class Head:
 def _with_person(
     data: HeadData, path: str | Path, identity: Mapping[str, float] | None, look: Look | None
 ) -> HeadData:  # fmt: skip
-    """Return the data of the head at ``path`` with an identity and the age of a look; errors as :meth:`Head.load`."""
+    """Return the data of the head at ``path`` with an identity, and the age and forehead of a look; errors as
+    :meth:`Head.load`."""
     if identity:
         data = with_identities(data, load_identities(path), identity, str(path))
-    return data if look is None else with_age(data, look.age)
+    return data if look is None else with_age(with_forehead(data, look.forehead), look.age)
 
 
 def _check_tilts(data: HeadData, path: str | Path) -> None:

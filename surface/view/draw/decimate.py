@@ -18,7 +18,7 @@ from surface.view.draw.materials import attribute, material_of, strip_uv
 
 #: Greatest root mean square error of triangles of quality "fast", mm, by material; and the share of it that each
 #: quality may have.
-ERROR_MM = {"skin": 0.5, "brow": 0.56, "lash": 0.42, "teeth": 0.2, "gums": 0.5, "mouth": 0.84, "eye": 0.35}
+ERROR_MM = {"skin": 0.5, "brow": 0.56, "lash": 0.42, "teeth": 0.27, "gums": 0.5, "mouth": 0.84, "eye": 0.35}
 _OTHER_ERROR_MM = 0.56
 SHARES = {"full": 0.36, "fast": 1.0}
 #: Poses in which the error is measured.

@@ -31,6 +31,8 @@ _OCCLUDERS = (("skin", "eye"), ("teeth", "gums", "tongue"))
 _SHADING = ("hair", "hat")
 #: How much of the light below them they take: some comes through hair, and is reflected by it.
 _WORN_SHADE = 0.75
+#: Inside the mouth a vertex counts as seen at most so far behind the depth picture: gaps between teeth are narrow.
+_INNER_BIAS_MM = 0.35
 #: Coefficients of the sky lie between minus and plus this.
 SKY_RANGE = 2.0
 #: Skin whose other side is further away lets no light through, mm.
@@ -113,7 +115,8 @@ def bake(
 
     directions : number of views from all around.
     resolution : pixels along the side of each depth picture.
-    bias_mm : how far behind the depth picture a vertex still counts as seen.
+    bias_mm : how far behind the depth picture a vertex still counts as seen; at most :data:`_INNER_BIAS_MM` inside the
+        mouth.
     worn : what shades the skin, too, as if nothing of it were clear.
 
     Returns part name -> (m, 5) float32: the share, 1 = open, 0 = buried, and the coefficients of :func:`fit_sky`; parts
@@ -127,8 +130,9 @@ def bake(
         for materials in _OCCLUDERS:
             members = [part for part in parts if part.material in materials]
             if members:
-                over = worn if "skin" in materials else ()
-                result |= _bake(ctx, members, directions, resolution, bias_mm, over)
+                outside = "skin" in materials
+                bias, over = (bias_mm, worn) if outside else (min(bias_mm, _INNER_BIAS_MM), ())
+                result |= _bake(ctx, members, directions, resolution, bias, over)
     finally:
         ctx.release()
     return result

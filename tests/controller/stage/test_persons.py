@@ -76,6 +76,10 @@ def test_a_persons_own_file_beside_the_stage(tmp_path: Path) -> None:
     [
         ('name = "x"\n[skin]\nmelanine = 1\n', "skin.melanine: unknown key, did you mean 'melanin'?"),
         ('name = "x"\n[skin]\nmelanin = 2\n', "skin.melanin: input should be less than or equal to 1 (is 2)"),
+        (
+            'name = "x"\n[skin]\nforehead = [1, 3, 0]\n',
+            "skin.forehead[1]: input should be less than or equal to 2 (is 3)",
+        ),
         ('name = "x"\n[eyes]\niris = "blue"\n', "eyes.iris: "),
         (f'name = "x"\n[hair]\nstyle = "{300 * "x"}"\n', "no hair 'xxx"),
         ('name = "x"\n[hair]\nstyle = "shrot"\n', "no hair 'shrot', did you mean 'short'? (there are afro, bun, crop"),
@@ -100,6 +104,7 @@ def test_nobody_of_that_name() -> None:
 def test_a_person_of_whom_nothing_is_said_has_a_usual_skin_and_wears_nothing() -> None:
     look = PersonSettings(name="anybody").look()
     assert (look.melanin, look.blood, look.redness, look.freckles, look.age) == (0.2, 0.0, 1.0, 0.0, 0.0)
+    assert look.forehead == (1.0, 1.0, 1.0)
     assert (look.lips, look.iris, look.brow, look.brow_strength, look.worn) == (None, None, None, 1.0, ())
 
 

@@ -5,6 +5,8 @@
 #define DEEP_MM vec2(12.0, 40.0)  // behind the lips: where the mouth's inside begins to be deep, and where it is
 #define ARCH_MM 45.0              // how far behind the lips the middle of the row of teeth lies
 #define ROUND_WALLS vec3(1.0, 0.86, 0.78)
+#define CREVICE vec3(0.34, 0.19, 0.15)  // of the light, what is left between two teeth and at the gum
+#define OPEN_SHARE 0.55                 // of the sky that a tooth sees, from which on it is in the open
 
 uniform mat4 view_projection;
 uniform vec3 camera;
@@ -62,6 +64,7 @@ void main() {
     // Teeth pass it on to each other, whiter than those walls do.
     vec3 bounce = mix(0.5 * (own + WALLS), NEIGHBOURS, 0.9 * teeth * (1.0 - inwards));
     vec3 arrives = reach / (reach + (1.0 - reach) * (1.0 - 0.9 * bounce));
+    arrives *= mix(vec3(1.0), mix(CREVICE, vec3(1.0), smoothstep(0.0, OPEN_SHARE, occlusion)), teeth);
     float nh = dot(n, normalize(key_direction + v));
     float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach;
     v_colour = encode(own * tint * light * arrives + shine * key_colour);

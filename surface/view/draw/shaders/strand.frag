@@ -1,8 +1,8 @@
 // Strands: locks part and thin out where their cover falls below a strand's height.
 #define SOFT vec2(0.9, 0.3)  // of strands' heights, over which each fades: few, as at a hairline, and many together
 #define STEADY 0.2  // a strand keeps its height along its length, so that no piece of it is left by itself
-#define PARTING vec3(0.1, 1.7, 2.4)  // mm from the roots: scalp, hair; how unevenly strands begin
-#define SCALP vec3(0.74, 0.66, 0.58)  // of skin between hair, which lights it warmly
+#define PARTING vec4(-0.3, 1.9, 3.6, 0.5)  // mm from the roots: scalp, hair; how unevenly strands begin; most of the scalp seen
+#define SCALP vec3(0.66, 0.56, 0.48)  // of skin between hair, which lights it warmly
 uniform sampler2D detail;
 uniform vec3 scalp;  // how much brighter than hair the skin at a parting is
 uniform bool multisampled;  // alpha then decides how many samples of a pixel a strand covers
@@ -16,7 +16,7 @@ centroid in vec4 v_strand;
 #endif
 #ifndef PER_VERTEX
 centroid in vec3 v_through;
-centroid in float v_surface;
+centroid in vec3 v_surface;
 #endif
 
 out vec4 colour;
@@ -45,8 +45,8 @@ void main() {
     vec3 lit = v_colour.rgb * (0.45 + 1.1 * noise.y + 0.9 * (noise.w - 0.5));
 #ifndef PER_VERTEX
     float sine = v_strand.w + 0.30 * (noise.z - 0.5);
-    lit += v_through * shine(sine, THROUGH) * (0.4 + 1.2 * noise.x);
-    lit += key_colour * (v_surface * shine(sine, SURFACE) * (0.2 + 1.6 * noise.y));
+    lit += v_through * shine(sine, THROUGH) * (0.3 + 1.4 * noise.x);
+    lit += v_surface * (shine(sine, SURFACE) * (0.1 + 2.9 * noise.y * noise.y));
 #endif
 #ifdef PER_VERTEX
     float roots = v_strand.w;
@@ -54,7 +54,7 @@ void main() {
     float roots = v_colour.a;
 #endif
     if (roots < 4.0) {  // few pixels
-        float bare = 1.0 - smoothstep(PARTING.x, PARTING.y, roots + PARTING.z * (noise.w - 0.5));
+        float bare = PARTING.w * (1.0 - smoothstep(PARTING.x, PARTING.y, roots + PARTING.z * (noise.w - 0.5)));
         lit = mix(lit, SCALP * scalp * v_colour.rgb, bare);
     }
     colour = vec4(encode(lit), cover);

@@ -77,3 +77,24 @@ def test_skin_below_the_line_is_hidden_and_above_it_is_not(skin: Skin) -> None:
         front = np.abs(np.arctan2(skin.points[:, 0], skin.points[:, 2] + 14.0)) < 0.02
         shown = y[front & (hidden < 0.5)]
         assert shown.min() == pytest.approx(neck.front - 10.0, abs=6.0)
+
+
+def test_cloth_has_no_edge_down_the_back_where_it_is_closed(made: tuple[str, list[Patches]]) -> None:
+    for patch in made[1]:
+        points = patch.points[0]
+        np.testing.assert_allclose(points[0], 0.5 * (points[1] + points[-2]), atol=1e-9)
+
+
+def test_a_turtlenecks_collar_is_rolled_down_over_itself(skin: Skin) -> None:
+    neck = NECKS["clothes-turtleneck"]
+    angle = np.linspace(np.pi, -np.pi, 40)
+    ring = module._ring(skin, neck, angle)
+    rows = np.stack(module._collar(skin, ring, neck))
+    _, off = skin.nearest(rows.reshape(-1, 3))
+    out = off.reshape(rows.shape[:2]).mean(axis=1)
+    fold = int(out.argmax())
+    assert 0 < fold < len(rows) - 1
+    assert out[fold] > out[0] + neck.roll and out[fold] > out[-1] + 0.8 * neck.roll  # a band over what is below it
+    below = garment(skin, neck)[0].strands[0, 0, :, 3]
+    dark = below[2:].argmin() + 2  # past the inside
+    assert below[:dark].max() > below[dark] + 0.3 < below[-1]  # and in its shade

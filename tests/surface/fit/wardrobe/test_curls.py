@@ -50,5 +50,15 @@ def test_a_shell_is_closed_behind_with_whole_tiles_and_thins_out_at_its_edge(sty
 
 def test_a_cloud_is_larger_than_a_crop(skin: Skin) -> None:
     close, full = (np.linalg.norm(make(skin).patches[0].points[0] - CENTRE, axis=2) for make in (crop, afro))
-    assert (full - close)[:, :4].min() > 8.0  # over the crown
+    assert (full[:, :4] - close[:, :4]).min() > 8.0  # over the crown
+
+
+def test_a_cloud_lies_close_at_the_line_and_rises_from_it_at_once(skin: Skin) -> None:
+    """Hair that begins far from the skin is a cap with a brim."""
+    points = afro(skin).patches[0].points[0]
+    assert heights(skin, points[:, -1]).max() < 3.0
+    assert np.median(heights(skin, points[:, -2])) > 1.5
+
+
+def test_a_crop_lies_close(skin: Skin) -> None:
     assert heights(skin, points_of(crop(skin).patches)).max() < 12.0

@@ -1,10 +1,13 @@
 """Skin by its melanin and blood, and wrinkles at rest."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from small_head import all_points, part, small_head
 
-from surface.head.model.look import OWN_MELANIN, TONES, skin_albedo, skin_tone, with_age
+from surface.head.model.data import Group
+from surface.head.model.look import OWN_MELANIN, TONES, skin_albedo, skin_tone, with_age, with_forehead
 
 
 def test_skin_darkens_with_melanin_in_every_channel():
@@ -62,3 +65,19 @@ def test_wrinkles_stand_at_rest_by_their_share_of_the_age(name, share):
         moved = with_age(head, age).parts[0].points - head.parts[0].points
         np.testing.assert_allclose(moved, np.tile([0, age * share, -2 * age * share], (25, 1)))
     np.testing.assert_array_equal(with_age(head, -1.0).parts[0].points, head.parts[0].points)
+
+
+def test_lines_of_the_forehead_are_as_deep_as_a_look_says_the_lowest_first():
+    rows = part("a", -40)
+    order = np.argsort(rows.points[:, 1], kind="stable")[::-1]  # the highest line comes first in the group
+    moves = np.tile(np.float32([0.0, 0.0, -2.0]), (25, 1))
+    others = [Group(name, order.astype(np.int32), moves) for name in ("wrinkleForeheadLeft", "wrinkleEyeLeft")]
+    head = small_head(parts=[replace(rows, groups=others)], seams=[])
+    folded, eye = with_forehead(head, (1.5, 0.5, 0.0)).parts[0].groups
+    height = np.round(rows.points[order, 1], 6)
+    lines = np.unique(height)
+    assert len(lines) == 5
+    for line, depth in zip(lines, (1.5, 0.5, 0.0, 0.0, 0.0), strict=True):
+        np.testing.assert_allclose(folded.moves[height == line], depth * moves[:5])
+    np.testing.assert_array_equal(eye.moves, moves)
+    assert with_forehead(head, (1.0, 1.0, 1.0)) is head

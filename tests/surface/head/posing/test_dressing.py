@@ -14,7 +14,7 @@ from surface.base.errors import HeadFileError
 from surface.head import Head
 from surface.head.model.data import Neck
 from surface.head.model.parameters import rotation
-from surface.head.posing.dressing import ALONG_MM, SCALP, THROUGH, WornMesh, dress, sample_picture
+from surface.head.posing.dressing import ALONG_MM, CURLED_MM, SCALP, SHADED, THROUGH, WornMesh, dress, sample_picture
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def garment(head: Head, fields: dict[str, np.ndarray] | None = None, **look: Any
     """A garment drawn as the part "b" of a small head, red at its roots and blue at its tips."""
     n = len(head.part("b").vertices)
     arrays = {
-        "strands": np.arange(4.0 * n).reshape(n, 4), "fast": np.array([[0, 1, 2]]),
+        "strands": 1e-3 * np.arange(4.0 * n).reshape(n, 4), "fast": np.array([[0, 1, 2]]),
         "tint": np.linspace(0, 255, n).astype(np.uint8), "shade": np.full(n, 64, np.uint8),
     }  # fmt: skip
     worn = {"path": "w.npz", "colour": (0.8, 0.0, 0.0), "tips": (0.0, 0.0, 0.8), "gloss": 0.25, **look}
@@ -40,7 +40,7 @@ def test_hair_goes_from_the_colour_of_its_roots_to_that_of_its_tips(head: Head) 
     tint = np.linspace(0, 255, len(part.vertices)).astype(np.uint8) / 255
     wanted = 0.4 * np.column_stack([1 - tint, 0 * tint, tint])  # at half brightness
     np.testing.assert_allclose(part.attributes["albedo"], wanted, atol=1e-6)
-    assert part.attributes["strands"].tolist() == np.arange(4.0 * len(tint)).reshape(-1, 4).tolist()
+    assert part.attributes["strands"].tolist() == np.float32(1e-3 * np.arange(4.0 * len(tint)).reshape(-1, 4)).tolist()
     assert (part.attributes["gloss"] == 0.25).all() and part.attributes["gloss"].shape == (len(tint), 1)
     assert part.decimated["fast"].tolist() == part.decimated["full"].tolist() == [[0, 1, 2]]
     step = 1e-4  # along v, on the surface itself
@@ -51,6 +51,17 @@ def test_hair_goes_from_the_colour_of_its_roots_to_that_of_its_tips(head: Head) 
     along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0], axis=1, keepdims=True)
     np.testing.assert_allclose(part.attributes["along"][inside], along, atol=1e-3)
     np.testing.assert_allclose(np.linalg.norm(part.attributes["along"], axis=1), 1.0, atol=1e-5)
+
+
+def test_curls_have_hardly_a_direction(head: Head) -> None:
+    """Their texture changes along them within a few mm, and light glints on single curls, not in a band."""
+    part, worn = head.part("b"), garment(head)
+    mm = np.linalg.norm(np.diff(part.vertices, axis=0), axis=1)
+    same = np.diff(part.mesh.uv[:, 0]) == 0.0
+    tiles = 0.4 * CURLED_MM
+    worn.parts[0].arrays["strands"][:, 1] = np.concatenate([[0.0], np.cumsum(np.where(same, mm, 7.0))]) / tiles
+    dress(head.parts, [worn])
+    np.testing.assert_allclose(np.linalg.norm(part.attributes["along"], axis=1), 0.4, rtol=1e-5)
 
 
 def test_hair_without_tips_has_one_colour_and_bright_hair_stays_in_range(head: Head) -> None:
@@ -96,10 +107,9 @@ def test_skin_below_has_the_colour_of_hair_and_lies_in_its_shade(head: Head) -> 
     u = skin.uv[:, :1]
     below = SCALP * np.array([0.8, 0, 0])
     light = np.minimum(below.mean() / before.mean(axis=1, keepdims=True), 1.0)  # beside the skin
-    np.testing.assert_allclose(
-        skin.attributes["albedo"], before + u * (1 - THROUGH * light) * (below - before), atol=1e-5
-    )
-    np.testing.assert_allclose(skin.attributes["occlusion"], 0.8 * (1 - 0.5 * u), atol=1e-5)
+    share = u * (1 - THROUGH * light)
+    np.testing.assert_allclose(skin.attributes["albedo"], before + share * (below - before), atol=1e-5)
+    np.testing.assert_allclose(skin.attributes["occlusion"], 0.8 * (1 - SHADED * share) * (1 - 0.5 * u), atol=1e-5)
     assert skin.attributes["albedo"].dtype == np.float32
 
 

@@ -134,7 +134,7 @@ ERRORS_MM = {
     "skin": 0.5,
     "brow": 0.56,
     "lash": 0.42,
-    "teeth": 0.2,
+    "teeth": 0.27,
     "gums": 0.5,
     "mouth": 0.84,
     "eye": 0.35,

@@ -65,10 +65,16 @@ def test_the_mouths_inside_is_shaded_by_itself_alone(gl: None) -> None:
     share = bake(
         [plate("teeth", 0.0, 20.0, "teeth"), plate("skin", 8.0, 100.0), plate("mouth", -5.0, 9.0, "mouth")],
         directions=24,
-        resolution=96,
+        resolution=256,
     )
     assert share["teeth"][:, 0].min() > 0.95
     assert (share["mouth"] == [1, 1, 0, 0, 0]).all()
+
+
+def test_gaps_between_teeth_are_dark_though_they_are_narrow(gl: None) -> None:
+    narrow = [plate("floor", 0.0, 20.0, "teeth"), plate("lid", 0.9, 20.0, "teeth")]
+    share = bake(narrow, directions=24, resolution=320)["floor"][:, 0].reshape(15, 15)
+    assert share[5:10, 5:10].max() < 0.05
 
 
 def test_neighbours_are_calmed_and_lone_vertices_left() -> None:
@@ -249,7 +255,7 @@ def test_pictures_are_96_of_512_pixels_where_nothing_else_is_asked_for(monkeypat
         "surface.view.pictures.occlusion._bake", lambda ctx, members, *how: given.append((len(members), *how)) or {}
     )
     bake(BallHead().parts)
-    assert given == [(3, 96, 512, 1.2, ()), (1, 96, 512, 1.2, ())] and ended == [1]
+    assert given == [(3, 96, 512, 1.2, ()), (1, 96, 512, 0.35, ())] and ended == [1]
 
 
 @pytest.mark.parametrize(("kind", "alpha", "least", "most"), [
