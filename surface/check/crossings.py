@@ -16,7 +16,7 @@ from surface.base.arrays import Bools, Floats, Ints
 from surface.base.jit import inlined, kernel, merged
 from surface.mesh.boxtree import LEAF, BoxTree
 
-ENCLOSED = 10.0  # maximum distance to the back of the flesh that encloses a point, in depths that are searched for
+ENCLOSED = 4.0  # maximum distance to the back of the flesh that encloses a point, in depths that are searched for
 NO_KIND = -1
 OBLIQUE = 1.5  # maximum depth of a vertex, relative to its distance from the crossing along its own surface: what the
 # two surfaces have in common is no nearer to it than the other surface is, which an oblique way meets further away
