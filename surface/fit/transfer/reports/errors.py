@@ -34,9 +34,10 @@ class FaceErrors:
     greatest: list[tuple[str, float, Floats]]
 
     def in_words(self, head: Head) -> list[str]:
-        """How far the scan is from the head at most, and where."""
+        """How far the scan is from the head, which is posed for it and at rest afterwards, at most, and where."""
         subject = Subject(head)
         places = Places(subject, find_mouth(subject))
+        head.pose(head.values({}))
         return [f"{mm:.2f} mm: {places.name(at)} ({name}, mesh to surface)" for name, mm, at in self.greatest]
 
     def lines(self, head: Head) -> list[str]:

@@ -119,7 +119,11 @@ def test_a_report_has_rms_most_and_the_hundredth_part_of_skin_and_of_eyes(monkey
 def test_the_greatest_distances_are_told_with_their_places() -> None:
     data = small_head()
     spots = [("face", 1.234, data.eyes[0] + [0.0, -2.0, 0.0]), ("eyes and lids", 2.5, data.eyes[1])]
-    skin, lids = FaceErrors([], spots).lines(Head(data))
+    head = Head(data)
+    rest = [part.vertices.copy() for part in head.parts]
+    head.pose(head.values({"jawOpen": 1.0}))
+    skin, lids = FaceErrors([], spots).lines(head)
+    assert all((part.vertices == before).all() for part, before in zip(head.parts, rest, strict=True))  # at rest again
     assert skin == "greatest error 1.23 mm: left eye (face, mesh to surface)"
     assert lids.startswith(
         "greatest error 2.50 mm: right eye (eyes and lids, mesh to surface); eyes and lids: eyeballs"
