@@ -133,6 +133,7 @@ def _check_head(folder: Path) -> Iterator[str]:
     """
     from surface.check import check_head  # imported lazily: only heads need it
     from surface.head import Head  # imported lazily: only heads and groups need it
+    from surface.head.model.data import GREATEST_ERROR  # imported lazily: as above
     from surface.head.model.identity import load_identities, with_identities  # imported lazily: as above
 
     head = Head.load(folder)
@@ -147,6 +148,8 @@ def _check_head(folder: Path) -> Iterator[str]:
         raise ConfigError("\n".join(f"{folder}: {line}" for line in defects))
     vertices = sum(len(part.vertices) for part in head.parts)
     yield f"head {head.name}: {len(head.parts)} parts, {vertices} vertices, {len(head.parameters)} parameters"
+    if said := head.data.provenance.get(GREATEST_ERROR):
+        yield f"  when it was fitted: greatest error {said}"
     yield from (f"  warning: {f.line(str(folder))}" for f in found)
 
 

@@ -9,14 +9,17 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.jit import inlined, kernel, merged
 from surface.mesh.boxtree import LEAF, BoxTree
 
-ENCLOSED = 10.0  # maximum distance to the back of the flesh that encloses a point, in depths that are searched for
+ENCLOSED = 4.0  # maximum distance to the back of the flesh that encloses a point, in depths that are searched for
 NO_KIND = -1
-OBLIQUE = 1.5  # maximum depth of a vertex, relative to its distance from the crossing along its own surface
+OBLIQUE = 1.5  # maximum depth of a vertex, relative to its distance from the crossing along its own surface: what the
+# two surfaces have in common is no nearer to it than the other surface is, which an oblique way meets further away
 
 
 @inlined
@@ -150,9 +153,10 @@ def _search(
 
 
 @kernel
-def _inward(pairs: Any, ids: Any, corners: Any, way: Any, cut: Any) -> None:
-    """For pairs (k, 2) of a triangle and one that it passes: mark in ``cut (k, 3)`` its edges that pass, and in ``way
-    (k, 3, 3)`` at the end of an edge that lies behind the other triangle that one's unit normal."""
+def _inward(pairs: Any, ids: Any, corners: Any, way: Any, cut: Any, away: Any) -> None:
+    """For pairs (k, 2) of a triangle and one that it passes: mark in ``cut (k, 3)`` its edges that pass; at the end of
+    an edge that lies behind the other triangle, ``way (k, 3, 3)`` is that one's unit normal, and ``away (k, 3)`` how
+    far it is from where the edge passes, infinite elsewhere."""
     for p in range(len(pairs)):
         x, y = corners[pairs[p, 0]], corners[pairs[p, 1]]
         e, f = y[1] - y[0], y[2] - y[0]
@@ -163,7 +167,10 @@ def _inward(pairs: Any, ids: Any, corners: Any, way: Any, cut: Any) -> None:
             t = _passes(x[k], x[m, 0] - x[k, 0], x[m, 1] - x[k, 1], x[m, 2] - x[k, 2], y[0], y[1], y[2])
             if t < 2.0:
                 cut[p, k] = True
-                way[p, k if t > 0.0 else m] = normal / length
+                e, behind = x[m] - x[k], k if t > 0.0 else m
+                way[p, behind] = normal / length
+                passed = abs(t) if t > 0.0 else 1.0 - abs(t)
+                away[p, behind] = min(away[p, behind], passed * np.sqrt((e * e).sum()))
 
 
 @kernel
@@ -270,15 +277,18 @@ class Crossings:
         both = both[(self.kind[both[:, 0]] == passing) & (self.kind[both[:, 1]] == passed)]
         if not len(both):
             return np.zeros(0, np.int64), np.zeros(0)
-        way, cut = np.zeros((len(both), 3, 3)), np.zeros((len(both), 3), bool)
-        _inward(both, self._ids, self.tree.corners, way, cut)
+        way, cut, away = np.zeros((len(both), 3, 3)), np.zeros((len(both), 3), bool), np.full((len(both), 3), np.inf)
+        _inward(both, self._ids, self.tree.corners, way, cut, away)
         at = np.zeros((self._count, 3))
         at[self._ids] = self.tree.corners
-        ways, length, far, queue = self._seeds(both, way)
-        used = _spread(self._start, self._beside, self._cut(both, cut), at, reach, ways, length, far, queue)
-        found = queue[:used][self._shown[queue[:used]]]
+        ways, length, far, queue = self._seeds(both, way, away)
+        cut_edges = self._cut(both, cut)
+        used = _spread(self._start, self._beside, cut_edges, at, reach, ways, length, far, queue)
+        found = queue[:used]
         depth = self._to_back(at, ways, found, reach, np.isin(np.arange(len(self._meets)), (passed, lining)))
-        deep = (depth > least) & (depth < OBLIQUE * (far[found] + length[found]))
+        depth[depth >= OBLIQUE * (far[found] + length[found])] = 0.0
+        reached = self._reached(found, depth, far, cut_edges)
+        deep = (depth > least) & reached & self._shown[found]
         found, depth = found[deep], depth[deep]
         if passing == passed:  # what lies in the flesh sees a back outwards, too; the edge of a fold does not
             enclosed = self._to_back(at, self._normals(at), found, ENCLOSED * reach, np.ones(len(self._meets), bool))
@@ -300,19 +310,34 @@ class Crossings:
         unit: Floats = out / np.maximum(np.linalg.norm(out, axis=1), 1e-12)[:, None]
         return unit
 
-    def _seeds(self, pairs: Ints, way: Floats) -> tuple[Floats, Floats, Floats, Ints]:
-        """Return the ends of edges behind what they pass: ways (n, 3), the triangle's longest edge (n,), the distance
-        (n,), which is 0 there, and a queue (n,) of them."""
-        ways, length, far = np.zeros((self._count, 3)), np.zeros(self._count), np.full(self._count, np.inf)
+    def _seeds(self, pairs: Ints, way: Floats, away: Floats) -> tuple[Floats, Floats, Floats, Ints]:
+        """Return the ends of edges behind what they pass: ways (n, 3), their distances (n,) from where an edge passes,
+        the distance (n,) of others from them, which is 0 there, and a queue (n,) of them."""
+        ways, length, far = np.zeros((self._count, 3)), np.full(self._count, np.inf), np.full(self._count, np.inf)
         hit = way.any(axis=2)
-        ids, corner = self._ids[pairs[:, 0]], self.tree.corners[pairs[:, 0]]
-        longest = np.linalg.norm(corner - np.roll(corner, 1, axis=1), axis=2).max(axis=1)
+        ids = self._ids[pairs[:, 0]]
         ways[ids[hit]], far[ids[hit]] = way[hit], 0.0
-        np.maximum.at(length, ids[hit], np.repeat(longest[:, None], 3, axis=1)[hit])
+        np.minimum.at(length, ids[hit], away[hit])
         queue = np.full(self._count, -1)
         first = np.unique(ids[hit])
         queue[: len(first)] = first
         return ways, length, far, queue
+
+    def _reached(self, found: Ints, depth: Floats, far: Floats, cut: Bools) -> Bools:
+        """Return (k,): which vertices ``found (k,)`` are joined to a crossing by others that lie behind something, too.
+
+        depth : (k,). far : (n,) of all vertices, 0 at the crossings. cut : (edges,). Behind an end of a crossing the
+        surface goes on in front, and comes to lie behind other parts of the head there.
+        """
+        behind = np.zeros(self._count, bool)
+        behind[found] = depth > 0.0
+        a, b = self._keys // self._count, self._beside
+        joined = behind[a] & behind[b] & ~cut
+        graph = coo_matrix((np.ones(int(joined.sum())), (a[joined], b[joined])), shape=(self._count, self._count))
+        _, label = connected_components(graph, directed=False)
+        reached = np.zeros(self._count, bool)
+        reached[label[found[(far[found] == 0.0) & (depth > 0.0)]]] = True
+        return np.asarray(reached[label[found]])
 
     def _cut(self, pairs: Ints, cut: Bools) -> Bools:
         """Return (edges,): which of the mesh's edges, both ways, pass through something."""

@@ -12,6 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.check.crossings import NO_KIND, Crossings
@@ -31,6 +34,8 @@ TEETH_SHAPES = ("", "jawOpen")  # in which overlaps with teeth are checked; "" i
 MAX_DEPTH_MM = 12.0  # of an overlap that is measured
 MIN_DEPTH_MM = 0.3
 MIN_REPORTED_MM = 1.0  # overlaps below this are not reported at the end of a fit
+TOGETHER_MM = 8.0  # vertices no further apart than that lie about one place
+DEEPER_MM = 0.5  # than in the neutral face: what is less belongs to that
 AREA_MM2 = 10.0
 LINING = "mouth"  # material of what lines the mouth: flesh lies between it and the skin
 MOVED_MM = 0.1  # what moves less counts as unmoved
@@ -99,6 +104,7 @@ class _Body:
         seen = are_visible(self._rest, triangles, subject.scale) & (kind == 0)
         self._crossings = Crossings(self._rest, triangles, same, kind, meets, seen)
         self._area = self._areas(triangles[seen], same)
+        self._at_rest = np.zeros((len(self._kinds), len(self._rest)))  # depths, once the neutral face was looked at
 
     def _at(self, vertices: list[Floats32]) -> Floats:
         return np.concatenate([vertices[k] for k in self.numbers]).astype(np.float64)
@@ -111,7 +117,8 @@ class _Body:
         return whole[same]
 
     def overlaps(self, shape: str, places: Places) -> Iterator[Overlap]:
-        """Return the overlaps of one shape, by material."""
+        """Return the overlaps of one shape, by material; "" comes first. Of a shape only that counts which is deeper
+        than in the neutral face: ears that hair hides pass through themselves in any."""
         subject, scale = self._subject, self._subject.scale
         at = self._at(subject.at_one(shape) if shape else subject.rest)
         pairs = self._crossings.pairs(at, least=MOVED_MM * scale if shape else -1.0)
@@ -122,8 +129,25 @@ class _Body:
             least, most = MIN_DEPTH_MM * scale, MAX_DEPTH_MM * scale
             lining = self._kinds.index(LINING) if material == "skin" else NO_KIND
             rows, depth = self._crossings.depths(pairs, 0, kind, most, least, lining)
-            order = np.argsort(-depth)
-            wide = np.flatnonzero(np.cumsum(self._area[rows[order]]) >= AREA_MM2 * scale**2)
-            if len(wide):
-                row = order[wide[0]]
+            if shape:
+                deeper = depth > self._at_rest[kind][rows] + DEEPER_MM * scale
+                rows, depth = rows[deeper], depth[deeper]
+            else:
+                self._at_rest[kind][rows] = depth
+            if (row := self._deepest(rows, depth)) is not None:
                 yield Overlap(float(depth[row]), material, shape, places.name(self._rest[rows[row]]), limit * scale)
+
+    def _deepest(self, rows: Ints, depth: Floats) -> int | None:
+        """Return the place among vertices (k,) whose depth is exceeded over enough area about one place; None where
+        no place has that much."""
+        if not len(rows):
+            return None
+        scale, order = self._subject.scale, np.argsort(-depth)
+        pairs = cKDTree(self._rest[rows]).query_pairs(TOGETHER_MM * scale, output_type="ndarray")
+        graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(rows), len(rows)))
+        label = connected_components(graph, directed=False)[1][order]
+        for k, row in enumerate(order.tolist()):
+            near = order[: k + 1][label[: k + 1] == label[k]]
+            if self._area[rows[near]].sum() >= AREA_MM2 * scale**2:
+                return int(row)
+        return None

@@ -56,7 +56,7 @@ from surface.fit.source.placing.place import neck_of, place
 from surface.fit.source.repair import repaired
 from surface.fit.source.wrap import wrap_chart
 from surface.head import Head
-from surface.head.model.data import HeadData, Neck, PartData
+from surface.head.model.data import HeadData, Neck, PartData, with_greatest_error
 from surface.head.model.file import check_writable, load_data
 from surface.head.model.meshes import pack, tessellate
 from surface.head.model.parameters import NAMES, read_pose
@@ -158,6 +158,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
+    head = with_greatest_error(head, str(dense.greatest) if dense.greatest else "")
     notes = [*worn.notes, *loaded.notes, *plan.notes, *turned_faces(mesh), *mended]
     notes += findings(head, loaded.marks, _kinds(loaded), {one.kind for one in worn.accessories})
     notes += overlap_notes(head)

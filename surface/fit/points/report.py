@@ -144,11 +144,18 @@ class DenseErrors:
     otherwise: Spot | None = None
     stiff: Spot | None = None
 
+    @property
+    def greatest(self) -> Spot | None:
+        """The greatest error of what was fitted: without contacts, where these move the head away from its mesh."""
+        return self.apart if self.worst and self.apart and self.apart.mm < self.worst.mm else self.worst
+
     def lines(self) -> list[str]:
         """In words: the greatest errors, what the mesh does not have, and what was left out of it."""
-        out = [f"greatest error {self.worst}"] if self.worst else []
-        if self.worst and self.apart and self.apart.mm < self.worst.mm:
-            out.append(f"without contacts, which keep lips, lids and tongue from passing through: {self.apart}")
+        out = [f"greatest error {self.greatest}"] if self.greatest else []
+        if self.greatest is not self.worst:
+            out.append(
+                f"with contacts, which move lips, lids and tongue out of each other, away from the mesh: {self.worst}"
+            )
         for what, spot in (("what would pass through itself", self.parted), ("lips that stay together", self.sealed)):
             if spot and spot.mm >= REPORTED_MM:
                 out.append(f"contacts move {what} on purpose by {spot.at_most}")

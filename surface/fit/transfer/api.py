@@ -27,7 +27,7 @@ from surface.fit.transfer.lids import close_lids
 from surface.fit.transfer.lining import keep_lining_behind
 from surface.fit.transfer.place_parts import scaled
 from surface.fit.transfer.register import STAGES, Matcher, Registered, register
-from surface.fit.transfer.reports.errors import face_reports, skin_errors
+from surface.fit.transfer.reports.errors import face_errors, skin_errors
 from surface.fit.transfer.reports.gaps import measure_gaps
 from surface.fit.transfer.reports.landmarkfile import read_landmarks, swapped
 from surface.fit.transfer.reports.report import (
@@ -44,6 +44,7 @@ from surface.fit.transfer.template import Template, make_template
 from surface.fit.transfer.warp_head import warp_head
 from surface.head import Head, HeadData
 from surface.head.model.accessories import Accessory
+from surface.head.model.data import with_greatest_error
 from surface.head.model.file import check_writable
 from surface.head.model.placement import Placement
 
@@ -126,10 +127,13 @@ def transfer(
     if scan.colours is not None:
         data, colour_notes = with_colours(data, scan.colours, scan.eye_colours)
         notes += colour_notes
-    parts = face_reports(data, template, done.warp, shown)
+    measured = face_errors(data, template, done.warp, shown)
+    parts = measured.parts
     registered = registration_errors(template, done, matcher, STAGES[-1].farthest)
     faults = tuple(faults_of_transfer(parts, registered[1], data, head))
     face = Head(data)
+    notes += measured.lines(face)
+    data = with_greatest_error(data, "; ".join(measured.in_words(face)))
     landmarks, openings = landmarks_of(face, done.marks, found), openings_of(face, samples)
     errors = {part: factor * mm for part, mm in skin_errors(face, scan).items()}
     data = _in_true_size(data, found, factor, options.unit or "")

@@ -12,13 +12,14 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.fit.transfer.align import face_region
 from surface.fit.transfer.detail.front import on_front
+from surface.fit.transfer.eye_depth import at_scan_depth
 from surface.fit.transfer.place_parts import behind_skin, place_eyes, place_jaw, place_neck, place_teeth
 from surface.fit.transfer.register import Matcher
 from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.skin import Ball, Skin, behind_lids, close_lips, follow_skin, rims_of, seat_on_eyeballs
 from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
-from surface.head import Group, Head, HeadData, PartData
+from surface.head import Contact, Group, Head, HeadData, PartData
 from surface.head.model.meshes import make_surface, pack, tessellate
 from surface.head.model.parameters import read_pose
 from surface.head.posing.rig import SkinRig
@@ -41,11 +42,13 @@ def warp_head(
     shown : samples of the scan that are in sight from outside.
     """
     data = head.data
-    old, new = Ball(data.eyes, data.eye_radius), Ball(*place_eyes(template, warp))
     front = shown.kept(on_front(warp(template.points[face_region(template)]), shown))
-    skins, finer = _skins(head, warp, smooth, matcher, front, old, new)
+    old, new = Ball(data.eyes, data.eye_radius), Ball(*place_eyes(template, warp))
+    skins = _skins(head, warp, smooth, matcher, front, old, new)
     lips = next(c for c in data.contacts if c.name == "lips")
     face = skins[lips.part]
+    new = at_scan_depth(template, face.at, face.rest, face.mesh.triangles, new, front.points)
+    finer = _solved(head, skins, lips, old, new)
     crowns = [p.vertices for p in head.parts if p.material == "teeth"]
     teeth = place_teeth(head, warp)
     if crowns:
@@ -78,12 +81,14 @@ def warp_head(
 
 def _skins(
     head: Head, warp: Warp, smooth: Warp, matcher: Matcher, front: Samples, old: Ball, new: Ball
-) -> tuple[dict[str, Skin], dict[str, PartData]]:  # fmt: skip
-    """The visible parts of skin, moved onto the scan, and the same parts of the head with as many control points as
-    they need there; both by name. front : samples of the scan on the front of the face."""
+) -> dict[str, Skin]:  # fmt: skip
+    """The visible parts of skin, moved onto the scan, by name; lids are not yet on the eyeballs.
+
+    front : samples of the scan on the front of the face.
+    """
     rims, scale = rims_of(head), new.radius / old.radius
     lips = next(c for c in head.data.contacts if c.name == "lips")
-    data, out, finer = {p.name: p for p in head.data.parts}, {}, {}
+    out = {}
     for part in head.parts:
         if part.follows == "skin" and part.material == "skin" and part.name != SOCKETS:
             skin = Skin(part, rims, warp, old, LONGEST_MM * scale)
@@ -91,12 +96,20 @@ def _skins(
             if part.name == lips.part:
                 skin.cover(matcher, front, scale)
                 skin.uncross(smooth, front, scale)
-            skin.at = seat_on_eyeballs(skin.at, skin.rest, old, new)
-            finer[part.name] = skin.solve(data[part.name], head.data.jaw)
-            if part.name == lips.part:
-                close_lips(skin, lips, scale)
             out[part.name] = skin
-    return out, finer
+    return out
+
+
+def _solved(head: Head, skins: dict[str, Skin], lips: Contact, old: Ball, new: Ball) -> dict[str, PartData]:
+    """The parts of the head that skins belong to, with as many control points as they need; the skins get their control
+    points, with lids on the eyeballs and closed lips."""
+    data, finer = {p.name: p for p in head.data.parts}, {}
+    for name, skin in skins.items():
+        skin.at = seat_on_eyeballs(skin.at, skin.rest, old, new)
+        finer[name] = skin.solve(data[name], head.data.jaw)
+        if name == lips.part:
+            close_lips(skin, lips, new.radius / old.radius)
+    return finer
 
 
 def stretches(warp: Warp, points: Floats) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from surface.base.arrays import Array, Floats, Floats32, Ints
 from surface.head.model.parameters import smoothstep
 from surface.head.model.placement import Placement
 from surface.mesh.domain import Slit
+
+GREATEST_ERROR = "greatest_error"  # in the provenance: how far a fit is from its mesh at most, in which shape and where
 
 
 @dataclass(frozen=True)
@@ -159,7 +161,7 @@ class Rule:
 class HeadData:
     """All of a head.
 
-    provenance : free text by key (source, licence, how it was made).
+    provenance : free text by key (source, licence, how it was made, :data:`GREATEST_ERROR`).
     eyes : centres (2, 3), left then right, mm; eye_radius : mm.
     placement : from the frame of the mesh it was fitted to; None for a head of which that is not known.
     """
@@ -176,3 +178,9 @@ class HeadData:
     contacts: list[Contact] = field(default_factory=list)
     rules: list[Rule] = field(default_factory=list)
     placement: Placement | None = None
+
+
+def with_greatest_error(head: HeadData, said: str) -> HeadData:
+    """The head with the greatest error of its fit, in words, in its provenance; with none where nothing is said."""
+    others = {key: text for key, text in head.provenance.items() if key != GREATEST_ERROR}
+    return replace(head, provenance=others | ({GREATEST_ERROR: said} if said else {}))

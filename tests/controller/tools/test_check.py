@@ -23,6 +23,7 @@ from controller.vocabulary.vocabulary import Vocabulary
 from surface import DCPSurface, Domain, Slit, SurfaceFileError
 from surface.base.errors import HeadFileError
 from surface.head import Head
+from surface.head.model.data import with_greatest_error
 from surface.head.model.file import save_data
 from surface.head.model.identity import Identity, save_identities
 from surface.readers import NamedSurface, write_surfaces
@@ -138,6 +139,16 @@ def test_a_good_head_says_what_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("surface.check.check_head", lambda head: [])  # which takes seconds, and has its own tests
     (line,) = check_anything("ict")
     assert line.startswith("head ict: 13 parts, ") and line.endswith(" 59 parameters: good")
+
+
+def test_a_head_says_how_far_it_is_from_its_mesh(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("surface.check.check_head", lambda head: [])
+    spot = "1.90 mm: shape jawOpen, chin (face, mesh to surface)"
+    save_data(tmp_path, with_greatest_error(small_head(), spot))
+    first, said = check_anything(str(tmp_path))
+    assert first.endswith(": good") and said == f"  when it was fitted: greatest error {spot}"
+    save_data(tmp_path, with_greatest_error(with_greatest_error(small_head(), spot), ""))
+    assert len(check_anything(str(tmp_path))) == 1
 
 
 def test_a_robot_may_be_called_as_the_file_of_a_head(tmp_path: Path) -> None:

@@ -132,3 +132,48 @@ def test_a_note_says_what_is_deeper_than_a_millimetre(monkeypatch: pytest.Monkey
     assert str(Overlap(2.345, "eye", "jawOpen", "left eye", 2.0)) == (
         "2.3 mm: skin passes through the eyeball: shape jawOpen, left eye"
     )
+
+
+def tilted(x: tuple[float, float], y: tuple[float, float], step: float, slope: float, z: float) -> Any:
+    """A sheet of an eyeball's material whose height is ``z`` at x = 0."""
+    points, triangles = plain.sheet(x, y, step)
+    points[:, 2] = z + slope * points[:, 0]
+    return plain.part("tilted", points, triangles, material="eye")
+
+
+def roof(x: tuple[float, float], z: float = 5.0) -> Any:
+    points, triangles = plain.sheet(x, (-10, 10), 1.0, z)
+    return plain.part("roof", points, triangles, material="eye")
+
+
+def test_what_another_part_covers_beside_the_end_of_a_crossing_does_not_lie_behind_it() -> None:
+    """A strip ends in front of the skin; beside it the skin lies in front of everything, then under a roof."""
+    skin = plain.part("face", *plain.sheet((-40, 40), (-40, 40), 1.0))
+    strip = tilted((-6.0, 0.0), (-10, 10), 1.0, -0.3, -0.75)
+    alone = measured(skin, strip)["eye"].mm
+    assert 0.5 < alone < 1.2
+    assert measured(skin, strip, roof((3.0, 9.0)))["eye"].mm == pytest.approx(alone, abs=0.1)
+
+
+def test_a_large_triangle_that_is_just_cut_is_not_as_deep_as_it_is_large() -> None:
+    """Its corner lies half a millimetre from the crossing, and five from the back of another part."""
+    skin = plain.part("face", *plain.sheet((-60, 60), (-60, 60), 20.0))
+    cut = tilted((0.3, 0.9), (-0.5, 0.5), 0.1, -0.3, 0.2)
+    assert measured(skin, cut, roof((-5.0, 5.0))).get("eye") is None
+
+
+def small(x: float) -> Any:
+    """A ball 1.5 mm high above the skin, which alone has too little area."""
+    points, triangles, normals = plain.ball((x, -60.0, -0.5), 2.0)
+    return plain.part(f"ball{x}", points, triangles, material="teeth", normals=normals)
+
+
+def test_areas_about_different_places_do_not_add_up() -> None:
+    assert measured(skin(), small(-20.0), small(0.0), small(20.0)) == {}
+    assert list(measured(skin(), small(-4.0), small(0.0), small(4.0))) == ["teeth"]
+
+
+@pytest.mark.parametrize(("by", "shape"), [(0.3, ""), (1.0, "cheekPuff")])
+def test_a_shape_that_lies_hardly_deeper_than_the_neutral_face_is_not_named(by: float, shape: str) -> None:
+    found = measured(skin(moves=pushed("cheekPuff", by)), ball(3.0, material="eye"))
+    assert found["eye"].shape == shape

@@ -23,7 +23,7 @@ from surface.fit.source.load import Loaded, worn_mesh
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import map_names
 from surface.head import Head
-from surface.head.model.data import Jaw
+from surface.head.model.data import GREATEST_ERROR, Jaw
 from surface.head.posing.fit_error import FIT_ERROR
 
 
@@ -155,7 +155,8 @@ def test_a_head_nothing_is_known_of_gets_a_neck_in_its_lower_quarter(fitted):
     z = slit_sheet().vertices[:, 2]
     assert data.neck.pivot == pytest.approx((0.0, -40.0, 0.5 * (z.min() + z.max())))
     assert (data.neck.slope, data.neck.still, data.neck.whole) == pytest.approx((0.0, -96.0, -60.0))
-    assert data.eye_radius == 0.0 and not data.eyes.any() and list(data.provenance) == ["made"]
+    assert data.eye_radius == 0.0 and not data.eyes.any() and list(data.provenance) == ["made", GREATEST_ERROR]
+    assert data.provenance[GREATEST_ERROR] == str(report.dense.greatest)
     assert report.scale == pytest.approx(200.0 / 338.0)
     assert "eyeBlinkLeft" in report.missing and "jawOpen" not in report.missing
 

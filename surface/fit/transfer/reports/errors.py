@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from surface.base.arrays import Floats
+from surface.check.mouth import find_mouth
+from surface.check.places import Places
+from surface.check.subject import Subject
 from surface.fit.measures.closest import ClosestTree
 from surface.fit.points.report import PartReport, errors_of
 from surface.fit.transfer.align import face_region
@@ -16,10 +21,32 @@ from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
 from surface.head import Head, HeadData
 
+LIDS = "eyes and lids"
 EYES = 1.6  # distance from an eyeball's axis, in radii, within which samples belong to eyes and lids
 
 
-def face_reports(data: HeadData, template: Template, warp: Warp, samples: Samples) -> list[PartReport]:
+@dataclass(frozen=True)
+class FaceErrors:
+    """Reports of the face and of eyes and lids; and of each the greatest distance, mm, with its place (3,) on the
+    scan; none of what was not measured."""
+
+    parts: list[PartReport]
+    greatest: list[tuple[str, float, Floats]]
+
+    def in_words(self, head: Head) -> list[str]:
+        """How far the scan is from the head, which is posed for it and at rest afterwards, at most, and where."""
+        subject = Subject(head)
+        places = Places(subject, find_mouth(subject))
+        head.pose(head.values({}))
+        return [f"{mm:.2f} mm: {places.name(at)} ({name}, mesh to surface)" for name, mm, at in self.greatest]
+
+    def lines(self, head: Head) -> list[str]:
+        """The same as sentences of a report."""
+        why = f"; {LIDS}: eyeballs are spheres, and lids lie on them, unlike those of a scan"
+        return [f"greatest error {said}{why if LIDS in said else ''}" for said in self.in_words(head)]
+
+
+def face_errors(data: HeadData, template: Template, warp: Warp, samples: Samples) -> FaceErrors:
     """Distances from the scan's samples on the front of the face to the nearest skin or eyeball of the head.
 
     The first report is of the face, the second of eyes and lids. The head always has spherical eyeballs with lids that
@@ -31,8 +58,10 @@ def face_reports(data: HeadData, template: Template, warp: Warp, samples: Sample
     off = np.linalg.norm(at[:, None, :2] - data.eyes[:, :2], axis=2).min(axis=1)
     eyes = off < EYES * data.eye_radius
     count = sum(len(p.points) for p in data.parts)
-    pairs = (("face", ~eyes, count), ("eyes and lids", eyes, 0))
-    return [PartReport(n, points, int(k.sum()), 0, errors_of(own[k]), {}) for n, k, points in pairs]
+    pairs = (("face", ~eyes, count), (LIDS, eyes, 0))
+    reports = [PartReport(n, points, int(k.sum()), 0, errors_of(own[k]), {}) for n, k, points in pairs]
+    rows = [(n, np.flatnonzero(k)[own[k].argmax()]) for n, k, _ in pairs if k.any()]
+    return FaceErrors(reports, [(n, float(own[row]), at[row]) for n, row in rows])
 
 
 def distances(head: Head, front: Floats, samples: Samples) -> tuple[Floats, Floats]:

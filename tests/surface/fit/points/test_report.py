@@ -136,12 +136,14 @@ def test_errors_are_told_line_by_line():
     dense = DenseErrors({}, spot(2.0), None, (), (), 1)
     assert dense.lines() == [f"greatest error {spot(2.0)}"]
     assert DenseErrors({}, None, None, (), (), 1, apart=spot(1.0)).lines() == []
+    assert DenseErrors({}, None, None, (), (), 1).greatest is None
     for apart, said in ((1.9, 2), (2.0, 1), (2.1, 1)):
-        assert len(replace(dense, apart=spot(apart)).lines()) == said
+        both = replace(dense, apart=spot(apart))
+        assert len(both.lines()) == said and both.greatest.mm == min(apart, 2.0)
     full = DenseErrors({}, spot(2.0), spot(3.0), ("a", "b"), ("c", "d"), 1, corrected=("e", "f"), apart=spot(1.0))
     assert full.lines() == [
-        f"greatest error {spot(2.0)}",
-        f"without contacts, which keep lips, lids and tongue from passing through: {spot(1.0)}",
+        f"greatest error {spot(1.0)}",
+        f"with contacts, which move lips, lids and tongue out of each other, away from the mesh: {spot(2.0)}",
         f"in folds (nostrils, ear canals, corners), which are held only loosely: {spot(3.0)}",
         "changed on purpose by correctives and the tongue's rules, and measured without them: e, f",
         "not in the mesh, so not measured: a, b",

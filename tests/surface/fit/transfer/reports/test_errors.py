@@ -5,11 +5,13 @@ from types import SimpleNamespace
 import made_face
 import numpy as np
 import pytest
+from small_head import small_head
 
 from surface.fit.transfer.reports import distances as distances_module
 from surface.fit.transfer.reports import errors as module
-from surface.fit.transfer.reports.errors import distances, face_reports
+from surface.fit.transfer.reports.errors import FaceErrors, distances, face_errors
 from surface.fit.transfer.scan import Samples
+from surface.head import Head
 
 Z = np.array([0.0, 0.0, 1.0])
 FRONT = np.array([[x, y, -5.0 + 65 * ((x + y) % 20 > 0)] for x in range(-40, 41, 5) for y in range(-50, 51, 5)])
@@ -99,12 +101,30 @@ def test_a_report_has_rms_most_and_the_hundredth_part_of_skin_and_of_eyes(monkey
     monkeypatch.setattr(module, "Head", lambda d: d)
     monkeypatch.setattr(module, "distances", lambda h, front, s: heard.append(front) or (inner, every))
     face = made_face.template()
-    skin, lids = face_reports(data, face, lambda p: p + 1.0, scan(0.0))
+    found = face_errors(data, face, lambda p: p + 1.0, scan(0.0))
+    skin, lids = found.parts
     assert (skin.name, skin.points, skin.samples) == ("face", 9, 1002)
     assert (lids.name, lids.points, lids.samples, lids.neutral.max) == ("eyes and lids", 0, 1, 5.0)
     own = np.append(off, 1.0)
     assert skin.neutral.rms == pytest.approx(np.sqrt((own**2).mean())) and skin.neutral.max == 2.0
     assert skin.neutral.p99 == pytest.approx(1.98, abs=0.002)
+    assert [(name, mm) for name, mm, _ in found.greatest] == [("face", 2.0), ("eyes and lids", 5.0)]
+    np.testing.assert_allclose([place for *_, place in found.greatest], [at[0], [30.0, 48, 90]])
     assert heard[0][:, 1].max() == pytest.approx(1 + face.points[module.face_region(face)][:, 1].max())
     monkeypatch.setattr(module, "distances", lambda *_: (np.zeros((0, 3)), np.zeros(0)))
-    assert not face_reports(data, face, lambda p: p, scan(0.0))[0].neutral.measured
+    nothing = face_errors(data, face, lambda p: p, scan(0.0))
+    assert not nothing.parts[0].neutral.measured and not nothing.greatest
+
+
+def test_the_greatest_distances_are_told_with_their_places() -> None:
+    data = small_head()
+    spots = [("face", 1.234, data.eyes[0] + [0.0, -2.0, 0.0]), ("eyes and lids", 2.5, data.eyes[1])]
+    head = Head(data)
+    rest = [part.vertices.copy() for part in head.parts]
+    head.pose(head.values({"jawOpen": 1.0}))
+    skin, lids = FaceErrors([], spots).lines(head)
+    assert all((part.vertices == before).all() for part, before in zip(head.parts, rest, strict=True))  # at rest again
+    assert skin == "greatest error 1.23 mm: left eye (face, mesh to surface)"
+    assert lids.startswith(
+        "greatest error 2.50 mm: right eye (eyes and lids, mesh to surface); eyes and lids: eyeballs"
+    )
