@@ -139,6 +139,7 @@ def unpack_cell(lists: Lists, made: Packed, c: int) -> list[Floats32]:
     row = made.entry_row[which].astype(np.int64)
     lanes = made.order[at : at + size].astype(np.int64) if at >= 0 else np.arange(size)
     steps = made.slope_step[first : first + tiles]
+    tables: list[tuple[np.ndarray, Floats32]]
     tables = [(made.packed, np.ones((tiles, 1), np.float32)), (made.packed_slope, steps)]
     blocks = []
     for table, step in tables[: 1 + (len(steps) > 0)]:

@@ -8,6 +8,9 @@
 #define CREVICE vec3(0.34, 0.19, 0.15)  // of the light, what is left between two teeth and at the gum
 #define OPEN_SHARE 0.55                 // of the sky that a tooth sees, from which on it is in the open
 
+#define BEHIND vec3(0.66, 0.50, 0.50)    // of the light, what the tongue leaves to the inner sides of teeth far back
+#define BEHIND_MM vec2(2.0, 22.0)       // behind the lips: where it begins to lie before them, and where it does
+
 uniform mat4 view_projection;
 uniform vec3 camera;
 uniform vec3 opening_centre;
@@ -50,7 +53,8 @@ void main() {
     vec3 away = position - opening_centre;
     vec3 outwards = normalize(dot(away, side) * side + (past + ARCH_MM) * out_of);
     float inwards = teeth * smoothstep(0.0, 0.5, -dot(n, outwards));
-    vec3 own = mix(mix(albedo, GUM, shade.y), WALLS, 0.45 * inwards);
+    float behind = teeth * max(deep, inwards * smoothstep(BEHIND_MM.x, BEHIND_MM.y, -past));
+    vec3 own = mix(mix(albedo, GUM, shade.y), WALLS, max(0.45 * inwards, 0.72 * behind));
     n = normalize(mix(n, out_of, 0.55 * deep));
     vec3 tint = mix(vec3(1.0), ROUND_WALLS, max(deep, inwards));
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)
@@ -65,6 +69,7 @@ void main() {
     vec3 bounce = mix(0.5 * (own + WALLS), NEIGHBOURS, 0.9 * teeth * (1.0 - inwards));
     vec3 arrives = reach / (reach + (1.0 - reach) * (1.0 - 0.9 * bounce));
     arrives *= mix(vec3(1.0), mix(CREVICE, vec3(1.0), smoothstep(0.0, OPEN_SHARE, occlusion)), teeth);
+    arrives *= mix(vec3(1.0), BEHIND, behind);
     float nh = dot(n, normalize(key_direction + v));
     float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach;
     v_colour = encode(own * tint * light * arrives + shine * key_colour);
