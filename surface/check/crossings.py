@@ -9,11 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.jit import inlined, kernel, merged
+from surface.check.components import joined
 from surface.mesh.boxtree import LEAF, BoxTree
 
 ENCLOSED = 4.0  # maximum distance to the back of the flesh that encloses a point, in depths that are searched for
@@ -332,9 +331,8 @@ class Crossings:
         behind = np.zeros(self._count, bool)
         behind[found] = depth > 0.0
         a, b = self._keys // self._count, self._beside
-        joined = behind[a] & behind[b] & ~cut
-        graph = coo_matrix((np.ones(int(joined.sum())), (a[joined], b[joined])), shape=(self._count, self._count))
-        _, label = connected_components(graph, directed=False)
+        both = behind[a] & behind[b] & ~cut
+        label = joined(self._count, a[both].astype(np.int64), b[both].astype(np.int64))
         reached = np.zeros(self._count, bool)
         reached[label[found[(far[found] == 0.0) & (depth > 0.0)]]] = True
         return np.asarray(reached[label[found]])

@@ -12,11 +12,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats, Floats32, Ints
+from surface.check.components import near_each_other
 from surface.check.crossings import NO_KIND, Crossings
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import find_mouth
@@ -143,9 +141,8 @@ class _Body:
         if not len(rows):
             return None
         scale, order = self._subject.scale, np.argsort(-depth)
-        pairs = cKDTree(self._rest[rows]).query_pairs(TOGETHER_MM * scale, output_type="ndarray")
-        graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(rows), len(rows)))
-        label = connected_components(graph, directed=False)[1][order]
+        places = np.ascontiguousarray(self._rest[rows], np.float64)
+        label = near_each_other(places, TOGETHER_MM * scale)[order]
         for k, row in enumerate(order.tolist()):
             near = order[: k + 1][label[: k + 1] == label[k]]
             if self._area[rows[near]].sum() >= AREA_MM2 * scale**2:

@@ -91,8 +91,7 @@ class EyeballClearance:
         self.sampling = near, *tile_weights(start, local, share), np.searchsorted(near, self.ids)
         self.samples, (s, p) = np.empty((len(places), 4)), (len(places), len(near))
         self.work = (np.zeros((p, 3)), np.full((p, 3), np.nan), np.zeros((p, 3), np.float32),
-                     np.zeros(3 * LANES, np.float32), self.samples, np.zeros(s), np.zeros(s), np.zeros(4),
-                     np.full((s, 4), np.nan), np.zeros((s, 4)))  # fmt: skip
+                     np.zeros(3 * LANES, np.float32), self.samples, np.zeros(s), np.zeros(s), np.zeros(4))  # fmt: skip
         gather_near(surface.points, near, self.eye, self.work[0])
         place_all(self.radius > 0.0, self.sampling, self.work)
         limits = height_limits(self.samples, self.radius, held=held, cling=cling)
@@ -133,8 +132,8 @@ class ContactSolver:
 
         For lips that is the overlap (2 k,) in mm that was found in each column, for lids how far their samples (2 k m,)
         slid and how far they were lifted. ``axis (3,)`` is where the eye looks; ``seal``, 0..1, how
-        firmly lips stay together. Where neither the eye nor the seal have changed, nor samples by more than
-        :data:`.contact_solve.STILL_MM`, the last answer is used again.
+        firmly lips stay together. Where neither the points near the opening nor the eye nor the seal have changed, the
+        last answer is used again.
         """
         sides = self._sides
         self.passes = part_sides(

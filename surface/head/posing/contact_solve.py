@@ -6,10 +6,10 @@ the kernels take are made by :mod:`.contact`:
 
 ``sampling`` : near (p,) control points of the samples; start, ids, share as :func:`.contact.tile_weights` gives them,
     with indices into ``near``; own (k,) indices into ``near`` of the points that are moved
-``limits`` : least, most, hold (s,) float64, radius and gain of :func:`.contact_kernels.find_lifts`; table and steps of
-    :func:`.contact_kernels.lift_points`
+``limits`` : least, most, hold (s,) float64, radius and gain of :func:`.contact_kernels.find_lifts`; table and steps
+    of :func:`.contact_kernels.lift_points`
 ``work`` : local, found (p, 3) float64; single (p, 3), room (24,) float32; samples (s, 4), heights, lifts (s,) float64;
-    looked (4,), placed, trial (s, 4) float64
+    looked (4,) float64
 """
 
 # mypy: disable-error-code="call-arg, var-annotated, no-untyped-def"
@@ -32,11 +32,6 @@ from .contact_kernels import (
 )
 
 SEAL_PASSES = 2  # of bringing sides together: the second closes what bending left open
-STILL_MM = 2e-3
-"""Where no sample has moved further since a contact was solved, its points are moved as they were then.
-
-A blink moves the other eye's lids, and the lips, by less than half of it: solving these contacts again reads tables
-that other work has driven out of the caches, and moves nothing that could be seen."""
 
 
 @nonallocating
@@ -48,49 +43,18 @@ def gather_near(points, near, eye, local):
 
 
 @nonallocating
-def is_known(local, found):
-    """Whether points (p, 3) are those that the last answer was found for."""
+def is_known(local, axis, seal, found, looked):
+    """Whether points, axis and seal are those of the last answer; they are kept as those of the next one if not."""
+    same = looked[3] == seal
+    looked[3] = seal
+    for c in range(3):
+        same = same and looked[c] == axis[c]
+        looked[c] = axis[c]
     for k in range(len(local)):
         for c in range(3):
-            if found[k, c] != local[k, c]:
-                return False
-    return True
-
-
-@nonallocating
-def is_looking(axis, seal, looked):
-    """Whether axis and seal are those of the last answer."""
-    return looked[0] == axis[0] and looked[1] == axis[1] and looked[2] == axis[2] and looked[3] == seal
-
-
-@nonallocating
-def is_still(trial, placed):
-    """Whether samples (s, 4) are within :data:`STILL_MM` of those that the last answer was found for."""
-    for k in range(len(trial)):
-        for c in range(3):
-            if not abs(trial[k, c] - placed[k, c]) <= STILL_MM:  # placed are nan before the first answer
-                return False
-    return True
-
-
-@nonallocating
-def keep_question(axis, seal, work):
-    """Keep points, samples, axis and seal as those that the next answer is found for."""
-    local, found, _, _, samples, _, _, looked, placed, trial = work
-    for c in range(3):
-        looked[c] = axis[c]
-    looked[3] = seal
-    copy_rows(local, found)
-    copy_rows(trial, placed)
-    copy_rows(trial, samples)
-
-
-@nonallocating
-def copy_rows(rows, out):
-    """Copy ``rows (n, c)`` to ``out (n, c)``; assigning a slice would allocate."""
-    for k in range(rows.shape[0]):
-        for c in range(rows.shape[1]):
-            out[k, c] = rows[k, c]
+            same = same and found[k, c] == local[k, c]
+            found[k, c] = local[k, c]
+    return same
 
 
 @kernel
@@ -99,7 +63,7 @@ def lift_once(axis, tolerance, sampling, limits, work):
     error."""
     _, _, _, _, own = sampling
     least, most, hold, radius, gain, table, steps = limits
-    local, _, _, room, samples, heights, lifts, _, _, _ = work
+    local, _, _, room, samples, heights, lifts, _ = work
     find_heights(samples, radius, axis, heights)
     error = find_lifts(heights, least, most, hold, gain, lifts)
     if error > tolerance:
@@ -110,14 +74,9 @@ def lift_once(axis, tolerance, sampling, limits, work):
 @nonallocating
 def place_all(around, sampling, work):
     """Place the samples."""
-    place_in(around, sampling, work, work[4])
-
-
-@nonallocating
-def place_in(around, sampling, work, out):
-    """Place the samples in ``out (s, 4)``."""
     _, start, ids, share, _ = sampling
-    place_samples(start, ids, share, work[0], around, work[2], work[3], out)
+    local, _, single, room, samples, _, _, _ = work
+    place_samples(start, ids, share, local, around, single, room, samples)
 
 
 @kernel
@@ -190,7 +149,8 @@ def part_sides(
     """Correct the control points (n, 3) at an opening in place, until the error is below ``tolerance``, mm.
 
     First lids are moved onto the eyeball, which opens them, and ``seal``, 0..1, of the opening is closed. Returns the
-    number of passes, at most ``passes``; 0 if the last answer still holds, or the moves that led to it do.
+    number of passes, at most ``passes``; 0 if the last answer still holds.
+
 
     press, soft : as in :func:`.contact_kernels.find_overlap`; rows : samples of a column.
     apart : (2 c, k) how far the moved points go up where the sides of a column part by 1.
@@ -199,45 +159,29 @@ def part_sides(
     push : what :meth:`.contact.ContactSolver.apply` returns.
     """
     near, _, _, _, own = sampling
-    local, found, looked, placed, trial, answer = work[0], work[1], work[7], work[8], work[9], opening[3]
+    local, found, looked, radius = work[0], work[1], work[7], limits[3]
+    before, profiles, _, answer, _, _ = opening
     gather_near(points, near, eye, local)
-    same = is_looking(axis, seal, looked)
-    if same and is_known(local, found):
-        for k in range(len(own)):
-            points[near[own[k]]] = answer[k]
-        return 0
-    place_in(limits[3] > 0.0, sampling, work, trial)
-    if same and is_still(trial, placed):
+    done = 0
+    if not is_known(local, axis, seal, found, looked):
+        push[:] = 0.0
+        place_all(radius > 0.0, sampling, work)
+        if seal > 0.0 and radius <= 0.0:
+            close_sides(seal, SEAL_PASSES, tolerance, rows, apart, opening, push, sampling, work)
+        if radius > 0.0:
+            trace_profiles(work[4], rows, radius, before)
+        error = tolerance
+        while done < passes and error >= tolerance:
+            error = part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, work)
+            done += 1
+        if radius > 0.0:
+            trace_profiles(work[4], rows, radius, profiles)
+            tell_moves(before, profiles, push)
         for k in range(len(own)):
             for c in range(3):
-                points[near[own[k]], c] += answer[k, c] - eye[c] - found[own[k], c]
-        return 0
-    keep_question(axis, seal, work)
-    done = solve_sides(axis, seal, passes, tolerance, press, soft, rows, apart, opening, push, sampling, limits, work)
+                answer[k, c] = eye[c] + local[own[k], c]
     for k in range(len(own)):
-        for c in range(3):
-            answer[k, c] = eye[c] + local[own[k], c]
         points[near[own[k]]] = answer[k]
-    return done
-
-
-@kernel
-def solve_sides(axis, seal, passes, tolerance, press, soft, rows, apart, opening, push, sampling, limits, work):
-    """Correct the points near an opening, whose samples are placed, as :func:`part_sides` says; returns the number of
-    passes."""
-    before, profiles, _, _, _, _ = opening
-    lids, done, error = limits[3] > 0.0, 0, tolerance
-    push[:] = 0.0
-    if seal > 0.0 and not lids:
-        close_sides(seal, SEAL_PASSES, tolerance, rows, apart, opening, push, sampling, work)
-    if lids:
-        trace_profiles(work[4], rows, limits[3], before)
-    while done < passes and error >= tolerance:
-        error = part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, work)
-        done += 1
-    if lids:
-        trace_profiles(work[4], rows, limits[3], profiles)
-        tell_moves(before, profiles, push)
     return done
 
 
