@@ -11,7 +11,8 @@ from surface.base.jit import kernel
 
 @kernel
 def _root(parent, k):
-    """Return the first of the component that ``k`` belongs to; ways to it get shorter (path halving)."""
+    """Return the first node of the component of node ``k``; ``parent (n,)`` int64 leads there, in fewer steps the next
+    time (path halving)."""
     while parent[k] != k:
         parent[k] = parent[parent[k]]
         k = parent[k]
@@ -20,26 +21,33 @@ def _root(parent, k):
 
 @kernel
 def _join(parent, a, b):
-    """Make one component of those that ``a`` and ``b`` belong to."""
+    """Make one component of those of the nodes ``a`` and ``b`` in ``parent (n,)``."""
     first, second = _root(parent, a), _root(parent, b)
     parent[max(first, second)] = min(first, second)
 
 
 @kernel
-def joined(count: int, a: Ints, b: Ints) -> Ints:
-    """Return (count,): a label of the component of each node, where ``a (k,)`` and ``b (k,)`` are joined."""
-    parent = np.arange(count)
-    for k in range(len(a)):
-        _join(parent, a[k], b[k])
-    for k in range(count):
+def _labels(parent):
+    """Return ``parent (n,)`` with the first node of its component for each."""
+    for k in range(len(parent)):
         parent[k] = _root(parent, k)
     return parent
 
 
 @kernel
+def joined(count: int, a: Ints, b: Ints) -> Ints:
+    """Return (count,) int64: the first node of the component of each node, where ``a (k,)`` and ``b (k,)`` are
+    joined."""
+    parent = np.arange(count)
+    for k in range(len(a)):
+        _join(parent, a[k], b[k])
+    return _labels(parent)
+
+
+@kernel
 def near_each_other(points: Floats, distance: float) -> Ints:
-    """Return (n,): a label of the component of each of ``points (n, 3)``, where those no further apart than
-    ``distance`` are joined."""
+    """Return (n,) int64: the first of the component of each of ``points (n, 3)``, where those no further apart than
+    ``distance``, in their unit, are joined."""
     parent = np.arange(len(points))
     for k in range(len(points)):
         for m in range(k):
@@ -48,6 +56,4 @@ def near_each_other(points: Floats, distance: float) -> Ints:
                 square += (points[k, c] - points[m, c]) ** 2
             if square <= distance * distance:
                 _join(parent, k, m)
-    for k in range(len(points)):
-        parent[k] = _root(parent, k)
-    return parent
+    return _labels(parent)

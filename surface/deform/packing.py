@@ -29,7 +29,7 @@ CANDIDATES = 64  # vertices, the next ones in the mesh's order, among which the 
 MAX_REMAINING = 0.97  # fraction of rows that reordering may leave; if it leaves more, vertices stay in order
 MAX_STEPS = 32766  # of the largest derivative; rounding may add one, and 16 bits hold 32767
 MIN_SLOPE = 1e-30  # a smaller largest one counts as 0: its step would leave the range of float32
-BALANCE_ROUNDS = 2  # of choosing how derivatives are rounded
+ROUNDING_PASSES = 2  # of choosing how derivatives are rounded
 MAX_ROWS = 1 << 16  # rows or vertices of a cell that can be packed: their numbers are uint16
 
 
@@ -113,7 +113,7 @@ def pack(lists: Lists, order: Order, wanted: Bools, points: Floats) -> Packed:
         lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.value, lists.slope, *vars(made).values()
     )
     if sloped:
-        _balance(
+        _round_slopes(
             lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.ids_at, lists.ids, lists.value, lists.slope,
             made.packed_at, made.tile_entry, made.entry_row, made.packed_slope, made.order_at, made.order,
             made.slope_step, points,
@@ -312,7 +312,7 @@ def _pack_cells(
 
 
 @kernel
-def _balance(
+def _round_slopes(
     cell_start, tile_start, rows, at, ids_at, ids, value, slope, packed_at, tile_entry, entry_row, packed_slope,
     order_at, order, slope_step, points,
 ):  # fmt: skip
@@ -329,7 +329,7 @@ def _balance(
             w = at[c] + (s // 8) * rows[c] * 8 + s % 8
             _from_vertex(w, entry_row[tile_entry[t] : tile_entry[t + 1]], value, places, away)
             for q in range(2):
-                _balance_vertex(
+                _round_vertex(
                     2 * w - s % 8 + 8 * q, lane % 8 + 8 * q, tile_entry[t], tile_entry[t + 1], slope_step[t, q], slope,
                     entry_row, packed_slope, away,
                 )  # fmt: skip
@@ -352,7 +352,7 @@ def _from_vertex(w, used, value, places, away):
 
 
 @kernel
-def _balance_vertex(w, lane, first, end, step, slope, entry_row, packed_slope, away):
+def _round_vertex(w, lane, first, end, step, slope, entry_row, packed_slope, away):
     """Round the derivatives of one vertex in one direction, whose entries are ``first`` to ``end``, so that the sum of
     their errors times ``away (rows, 3)`` is short; ``w`` : where they start in ``slope``, sixteen apart."""
     x, y, z = 0.0, 0.0, 0.0
@@ -360,7 +360,7 @@ def _balance_vertex(w, lane, first, end, step, slope, entry_row, packed_slope, a
         k = np.int64(entry_row[e])
         error = step * packed_slope[16 * e + lane] - slope[w + 16 * k]
         x, y, z = x + error * away[k, 0], y + error * away[k, 1], z + error * away[k, 2]
-    for _ in range(BALANCE_ROUNDS):
+    for _ in range(ROUNDING_PASSES):
         for e in range(first, end):
             k = np.int64(entry_row[e])
             error = step * packed_slope[16 * e + lane] - slope[w + 16 * k]

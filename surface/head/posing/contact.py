@@ -19,6 +19,7 @@ from surface.deform.lists import LANES
 from surface.head.model.data import Contact, HeadData
 from surface.head.model.parameters import smoothstep
 from surface.head.posing.contact_kernels import (
+    MAX_SHORT,
     SHARE_STEP,
     find_gaps,
     find_heights,
@@ -260,7 +261,7 @@ def by_lanes(table: Floats) -> tuple[Shorts, Floats]:
     out of the caches takes longer than the sums, and so half as long as with float32."""
     rows, columns = table.shape
     padded = np.zeros((rows, -(-columns // LANES) * LANES), np.int16)
-    steps = np.maximum(np.abs(table).max(axis=0), 1e-30) / 32767
+    steps = np.maximum(np.abs(table).max(axis=0), 1e-30) / MAX_SHORT
     padded[:, :columns] = np.rint(table / steps)
     return np.ascontiguousarray(padded.reshape(rows, -1, LANES).transpose(1, 0, 2)).ravel(), steps
 

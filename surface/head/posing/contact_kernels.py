@@ -14,7 +14,8 @@ from surface.spline.lanes import add, fma_at, item, load, store3, zero
 # The cornea protrudes from the eyeball: its sphere's centre and radius, in eyeball radii, as
 # surface.fit.points.eyeball has it
 CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
-SHARE_STEP = 1.0 / 32767.0  # shares of control points in samples are whole multiples of it: half the memory to read
+MAX_SHORT = 32767  # the largest 16-bit number
+SHARE_STEP = 1.0 / MAX_SHORT  # shares of control points in samples are whole multiples of it: half the memory to read
 MAX_SIGHT = 0.7  # tangent of 35 degrees: up to this far from the front, closed lips still look closed
 # coefficients of Taylor's series: of x**10 to 1, of the sine over x and of the cosine
 SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(5, -1, -1))

@@ -61,7 +61,7 @@ def test_derivatives_are_rounded_so_that_those_of_the_surface_stay(monkeypatch: 
     surface, mesh = body()
     lists = build_lists(surface, mesh, True)
     chosen = missed_derivatives(lists, surface)
-    monkeypatch.setattr(packing, "_balance", lambda *_: None)  # each to the nearest step
+    monkeypatch.setattr(packing, "_round_slopes", lambda *_: None)  # each to the nearest step
     nearest = missed_derivatives(lists, surface)
     assert np.sqrt((chosen**2).mean()) < 0.7 * np.sqrt((nearest**2).mean()) > 0.0
     assert (chosen <= nearest + 1e-12).all()
