@@ -27,11 +27,10 @@ def _join(parent, a, b):
 
 
 @kernel
-def _labels(parent):
-    """Return ``parent (n,)`` with the first node of its component for each."""
+def _label(parent):
+    """Set each of ``parent (n,)`` to the first node of its component."""
     for k in range(len(parent)):
         parent[k] = _root(parent, k)
-    return parent
 
 
 @kernel
@@ -41,7 +40,8 @@ def joined(count: int, a: Ints, b: Ints) -> Ints:
     parent = np.arange(count)
     for k in range(len(a)):
         _join(parent, a[k], b[k])
-    return _labels(parent)
+    _label(parent)
+    return parent
 
 
 @kernel
@@ -56,4 +56,5 @@ def near_each_other(points: Floats, distance: float) -> Ints:
                 square += (points[k, c] - points[m, c]) ** 2
             if square <= distance * distance:
                 _join(parent, k, m)
-    return _labels(parent)
+    _label(parent)
+    return parent
