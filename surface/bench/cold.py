@@ -17,6 +17,7 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
 from surface.deform.deformation import Deformation
+from surface.deform.fixed import take_all
 from surface.deform.lists import build_lists
 from surface.mesh.domain import Domain
 from surface.mesh.mesh import Mesh
@@ -137,7 +138,7 @@ def zero_fraction(deformations: Sequence[Deformation[DCPSurface]]) -> float:
 
     Weights that are stored as factors do not count.
     """
-    kept = [table for d in deformations for table in (d.lists.value[: d.lists.used], d.storage.packed.packed)]
+    kept = [t for d in deformations for t in (d.lists.value[: d.lists.used], take_all(d.storage.packed.packed).ravel())]
     total = sum(len(table) for table in kept)
     return 1.0 - sum(int(np.count_nonzero(table)) for table in kept) / total if total else 0.0
 

@@ -33,8 +33,9 @@ from surface.spline.lanes import (
 
 from .binding import arrays_of
 from .groupsums import HEAD, STEP, factor_counts, join_all, join_values, sum_groups, takes_whole
-from .packedsums import AHEAD, sum_all_packed, sum_packed, write_lanes
+from .packedsums import sum_all_packed, sum_packed, write_lanes
 
+AHEAD = 1024  # plain weights that are prefetched before they are needed
 AHEAD_OUT = 384  # coordinates of vertices that are fetched before they are written: 16 tiles
 MAX_SQUARE = np.float32(1e36)  # of a vector's length
 

@@ -21,7 +21,7 @@ from .updates import measure
 from .working import middles
 
 SLICE_BYTES = 200_000  # of weights: with what belongs to them, they fit a core's own cache
-WEIGHT_BYTES = 8  # of a packed weight and of its derivatives in u and v
+WEIGHT_BYTES = 7  # of a packed weight and of its derivatives in u and v
 
 
 @nonallocating

@@ -26,11 +26,12 @@ NAMES = (
     "pull", "span", "drift", "extent",
     "rows_at", "picks_at", "factor_u", "factor_v", "factors", "picks",
     "packed_at", "tile_entry", "entry_row", "packed", "packed_slope", "places_at", "places", "order_at", "order",
-    "touched", "heavy", "starts",
+    "touched", "heavy", "starts", "power",
 )  # fmt: skip
 """The arrays of an update in the order of the tuple ``arrays``: of :class:`.lists.Lists`, then of :mod:`.deformation`,
 then of :class:`.factors.Factors` and :class:`.packing.Packed`; then which tiles an update touches,
-how much all weights at a vertex of a cell may add up to, and scratch space for factorized sums.
+how much all weights at a vertex of a cell may add up to, scratch space for factorized sums, and the exponents of packed
+weights.
 
 Kernels unpack that tuple once.
 """
@@ -84,7 +85,8 @@ def arrays_of(table):
         _flat(table, 33, np.int64), _flat(table, 34, np.int64), _flat(table, 35, np.int32), _flat(table, 36, np.int32),
         _flat(table, 37, np.float32), _flat(table, 38, np.int32),
         _flat(table, 39, np.int64), _flat(table, 40, np.int64), _flat(table, 41, np.uint16),
-        _flat(table, 42, np.float32), _flat(table, 43, np.int16), _flat(table, 44, np.int64),
+        _flat(table, 42, np.uint8), _flat(table, 43, np.int16), _flat(table, 44, np.int64),
         _flat(table, 45, np.uint16), _flat(table, 46, np.int64), _flat(table, 47, np.uint16),
         _flat(table, 48, np.uint8), _flat(table, 49, np.float64), _flat(table, 50, np.int32),
+        _flat(table, 51, np.int16),
     )  # fmt: skip

@@ -9,6 +9,7 @@ from surface.base.arrays import Floats
 from surface.base.jit import inlined, kernel
 
 from .binding import arrays_of
+from .fixed import take
 from .groupsums import HEAD, STEP, factor_counts
 
 MIN_SUM = 1e-36  # of the weights at a vertex; smaller float32 numbers have fewer digits
@@ -22,6 +23,18 @@ def _sum_entries(value, slope, first, end, slopes, j):
     w, wu, wv, au, av = 0.0, 0.0, 0.0, 0.0, 0.0
     for e in range(first, end):
         w += value[8 * e + j]
+        if slopes:
+            u, v = slope[16 * e + j], slope[16 * e + 8 + j]
+            wu, wv, au, av = wu + u, wv + v, au + abs(u), av + abs(v)
+    return w, wu, wv, max(w, au, av)
+
+
+@inlined
+def _sum_packed(packed, slope, first, end, slopes, j):
+    """Return the same sums of packed entries, as kernels read them."""
+    w, wu, wv, au, av = 0.0, 0.0, 0.0, 0.0, 0.0
+    for e in range(first, end):
+        w += take(packed, e, j)
         if slopes:
             u, v = slope[16 * e + j], slope[16 * e + 8 + j]
             wu, wv, au, av = wu + u, wv + v, au + abs(u), av + abs(v)
@@ -65,7 +78,7 @@ def denominators(table, cells):
     inv_w, dw = arrays[15:17]
     rows_at, picks_at, factor_u, factor_v, factors, picks = arrays[33:39]
     packed_at, tile_entry, _, packed, packed_slope = arrays[39:44]
-    heavy = arrays[49]
+    heavy, power = arrays[49], arrays[51]
     slopes = dw.shape[0] > 0
     for q in range(cells.shape[0]):
         c = cells[q]
@@ -74,7 +87,7 @@ def denominators(table, cells):
         if rows_at[c] >= 0:
             heavy[c] = _heaviest_group(rows[c], rows_at[c], wide_u, factor_u, factor_v, factors, slopes)
         for lane in range(8 * tile_start[c], 8 * tile_start[c + 1]):
-            t, j = lane // 8 - tile_start[c], lane % 8
+            t, j, least = lane // 8 - tile_start[c], lane % 8, MIN_SUM
             if rows_at[c] >= 0:
                 pick_at = picks_at[c] + HEAD + STEP * t
                 w, wu, wv, most = _sum_factors(
@@ -82,14 +95,15 @@ def denominators(table, cells):
                 )
             elif packed_at[c] >= 0:
                 first, end = tile_entry[packed_at[c] + t], tile_entry[packed_at[c] + t + 1]
-                w, wu, wv, most = _sum_entries(packed, packed_slope, first, end, slopes, j)
+                w, wu, wv, most = _sum_packed(packed, packed_slope, first, end, slopes, j)
+                least = MIN_SUM * 2.0 ** -np.int64(power[8 * (packed_at[c] + t) + j])
             else:
                 first = at[c] // 8 + t * room[c]
                 w, wu, wv, most = _sum_entries(value, slope, first, first + rows[c], slopes, j)
             if cell_start[c] + lane - 8 * tile_start[c] >= cell_start[c + 1]:
                 w = 1.0  # lanes that fill up the last tile
             heavy[c] = max(heavy[c], most)
-            inv_w[lane] = 1.0 / w if w >= MIN_SUM else np.inf
+            inv_w[lane] = 1.0 / w if w >= least else np.inf
             if slopes:
                 dw[16 * (lane // 8) + j], dw[16 * (lane // 8) + 8 + j] = wu, wv
 

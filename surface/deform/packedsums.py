@@ -4,9 +4,9 @@
 from __future__ import annotations
 
 from surface.base.jit import inlined
-from surface.spline.lanes import add, fma, fma_at, item, load, prefetch, store, store3, store3_at, zero
+from surface.spline.lanes import add, fma, fma_at, item, load, load_fixed, prefetch, store, store3, store3_at, zero
 
-AHEAD = 1024  # weights that are prefetched before they are needed
+AHEAD = 128  # entries that are prefetched before they are needed
 
 
 @inlined
@@ -19,17 +19,17 @@ def sum_packed(packed, entry_row, e, end, local):
     while e + 4 <= end:
         p, q = 3 * item(entry_row, e), 3 * item(entry_row, e + 1)
         r, s = 3 * item(entry_row, e + 2), 3 * item(entry_row, e + 3)
-        a, b = load(packed, 8 * e), load(packed, 8 * e + 8)
-        c, d = load(packed, 8 * e + 16), load(packed, 8 * e + 24)
-        prefetch(packed, 8 * e + AHEAD)
-        prefetch(packed, 8 * e + 16 + AHEAD)
+        a, b = load_fixed(packed, 24 * e), load_fixed(packed, 24 * e + 24)
+        c, d = load_fixed(packed, 24 * e + 48), load_fixed(packed, 24 * e + 72)
+        prefetch(packed, 24 * (e + AHEAD))
+        prefetch(packed, 24 * (e + AHEAD) + 48)
         x0, y0, z0 = fma_at(a, local, p, x0), fma_at(a, local, p + 1, y0), fma_at(a, local, p + 2, z0)
         x1, y1, z1 = fma_at(b, local, q, x1), fma_at(b, local, q + 1, y1), fma_at(b, local, q + 2, z1)
         x2, y2, z2 = fma_at(c, local, r, x2), fma_at(c, local, r + 1, y2), fma_at(c, local, r + 2, z2)
         x3, y3, z3 = fma_at(d, local, s, x3), fma_at(d, local, s + 1, y3), fma_at(d, local, s + 2, z3)
         e += 4
     while e < end:
-        a, p = load(packed, 8 * e), 3 * item(entry_row, e)
+        a, p = load_fixed(packed, 24 * e), 3 * item(entry_row, e)
         x0, y0, z0 = fma_at(a, local, p, x0), fma_at(a, local, p + 1, y0), fma_at(a, local, p + 2, z0)
         e += 1
     return add(add(x0, x1), add(x2, x3)), add(add(y0, y1), add(y2, y3)), add(add(z0, z1), add(z2, z3))
@@ -42,9 +42,9 @@ def sum_all_packed(packed, packed_slope, entry_row, first, end, local):
     ax, ay, az, bx, by, bz = zero(), zero(), zero(), zero(), zero(), zero()
     for e in range(first, end):
         p = 3 * item(entry_row, e)
-        w, u, v = load(packed, 8 * e), load(packed_slope, 16 * e), load(packed_slope, 16 * e + 8)
-        prefetch(packed, 8 * e + AHEAD)
-        prefetch(packed_slope, 16 * e + 2 * AHEAD)
+        w, u, v = load_fixed(packed, 24 * e), load(packed_slope, 16 * e), load(packed_slope, 16 * e + 8)
+        prefetch(packed, 24 * (e + AHEAD))
+        prefetch(packed_slope, 16 * (e + AHEAD))
         x, y, z = fma_at(w, local, p, x), fma_at(w, local, p + 1, y), fma_at(w, local, p + 2, z)
         ax, ay, az = fma_at(u, local, p, ax), fma_at(u, local, p + 1, ay), fma_at(u, local, p + 2, az)
         bx, by, bz = fma_at(v, local, p, bx), fma_at(v, local, p + 1, by), fma_at(v, local, p + 2, bz)
@@ -100,7 +100,7 @@ def add_packed_row(
             continue
         e, base = item(tile_entry, at + tile - first_tile) + number - 1, tile * size
         touched[tile] = 1
-        a = load(packed, 8 * e)
+        a = load_fixed(packed, 24 * e)
         add_products(numerators, base, a, dx, dy, dz)
         if slopes:
             u, v = load(packed_slope, 16 * e), load(packed_slope, 16 * e + 8)

@@ -5,10 +5,12 @@ tile after tile, the rows that are not all zero, and for each which point of the
 are put into tiles so that those of a tile share most of their points; ``order`` leads back to the mesh's order. Cells
 that are packed get blocks of plain weights, in the mesh's order, before their weights or knots change.
 
-Derivatives of weights are whole numbers of steps, one step in u and one in v for each tile, so that they take half of
-the memory that every frame reads. Normals are directions, in which a common factor of all derivatives does not show:
-kernels take the numbers as they are. Each is rounded up or down so that together they change the derivatives of the
-surface as it is packed least; where control points lie close together, those further away would change them most.
+Weights are fixed-point numbers of 24 bits, see :mod:`.fixed`, times a power of two for each vertex; kernels take the
+numbers as they are, since they divide by the sum of these. Derivatives of weights are whole numbers of steps, one step
+in u and one in v for each tile, so that they take half of the memory that every frame reads. Normals are directions, in
+which a common factor of all derivatives does not show: kernels take these numbers as they are, too. Each is rounded up
+or down so that together they change the derivatives of the surface as it is packed least; where control points lie
+close together, those further away would change them most.
 """
 
 # mypy: allow-untyped-defs
@@ -18,10 +20,12 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from surface.base.arrays import Bools, Floats, Floats32, Ints, Shorts
 from surface.base.jit import kernel
 
+from .fixed import BYTES, power_of, put, take_all
 from .lists import LANES, Lists
 
 PLAIN = -1  # in ``packed_at``: the cell is not packed; in ``order_at``: its lanes follow the mesh's order
@@ -40,24 +44,27 @@ class Packed:
     packed_at : (c,) int64, where every cell's tiles start in ``tile_entry``; PLAIN where the cell is not packed
     tile_entry : (t,) int64, where every tile's entries start; after a cell's last tile, where these end
     entry_row : (e,) uint16, the row of each entry's point in the cell's list
-    packed : (8 e,) float32; packed_slope : (16 e,) int16 in steps, or empty for a mesh without normals
+    packed : (24 e,) uint8, fixed-point numbers; packed_slope : (16 e,) int16 in steps, or empty for a mesh without
+        normals
     places_at : (c,) int64, where every cell's rows start in ``places``
     places : (p,) uint16, by row and tile: the entry's number in its tile, from 1 on; 0 if there is none
     order_at : (c,) int64, where every cell's lanes start in ``order``; PLAIN where they follow the mesh's order
     order : (o,) uint16, the vertex of every lane, counted from the cell's first one
     slope_step : (t, 2) float32, the step of every tile's derivatives in u and in v; (0, 2) for a mesh without normals
+    power : (8 t,) int16, the exponent of the power of two that belongs to the weights of every lane
     """
 
     packed_at: Ints
     tile_entry: Ints
     entry_row: np.ndarray
-    packed: Floats32
+    packed: NDArray[np.uint8]
     packed_slope: Shorts
     places_at: Ints
     places: np.ndarray
     order_at: Ints
     order: np.ndarray
     slope_step: Floats32
+    power: Shorts
 
     @property
     def nbytes(self) -> int:
@@ -103,11 +110,11 @@ def pack(lists: Lists, order: Order, wanted: Bools, points: Floats) -> Packed:
     sloped, ends = len(lists.slope) > 0, int((tiles + 1)[chosen].sum())
     made = Packed(
         packed_at=_cell_starts(tiles + 1, chosen), tile_entry=np.zeros(ends, np.int64),
-        entry_row=np.zeros(entries, np.uint16), packed=np.zeros(LANES * entries, np.float32),
+        entry_row=np.zeros(entries, np.uint16), packed=np.zeros(BYTES * entries, np.uint8),
         packed_slope=np.zeros(2 * LANES * entries * sloped, np.int16),
         places_at=_cell_starts(blocks, chosen), places=np.zeros(int(blocks[chosen].sum()), np.uint16),
         order_at=_cell_starts(LANES * tiles, moved), order=order.order[np.repeat(moved, LANES * tiles)],
-        slope_step=np.ones((ends * sloped, 2), np.float32),
+        slope_step=np.ones((ends * sloped, 2), np.float32), power=np.zeros(LANES * ends, np.int16),
     )  # fmt: skip
     _pack_cells(
         lists.cell_start, lists.tile_start, lists.rows, lists.at, lists.value, lists.slope, *vars(made).values()
@@ -138,15 +145,17 @@ def unpack_cell(lists: Lists, made: Packed, c: int) -> list[Floats32]:
     tile = np.repeat(np.arange(tiles), np.diff(starts))
     row = made.entry_row[which].astype(np.int64)
     lanes = made.order[at : at + size].astype(np.int64) if at >= 0 else np.arange(size)
-    steps = made.slope_step[first : first + tiles]
-    tables: list[tuple[np.ndarray, Floats32]]
-    tables = [(made.packed, np.ones((tiles, 1), np.float32)), (made.packed_slope, steps)]
+    weights = take_all(made.packed[BYTES * which.start : BYTES * which.stop])
+    power = made.power.reshape(-1, LANES)[first : first + tiles]
+    tables = [np.ldexp(weights, power[tile])[:, None]]
+    if len(made.slope_step):
+        slopes = made.packed_slope.reshape(-1, 2, LANES)[which]
+        tables.append(slopes * made.slope_step[first : first + tiles][tile, :, None])
     blocks = []
-    for table, step in tables[: 1 + (len(steps) > 0)]:
-        wide = step.shape[1]
+    for entries in tables:
+        wide = entries.shape[1]
         own = np.zeros((rows, wide, tiles, LANES), np.float32)
-        entries = table[LANES * wide * which.start : LANES * wide * which.stop].reshape(-1, wide, LANES)
-        own[row, :, tile] = entries * step[tile, :, None]
+        own[row, :, tile] = entries
         flat = own.reshape(rows, wide, -1)
         back = np.zeros_like(flat)
         back[..., lanes] = flat[..., :size]
@@ -282,9 +291,19 @@ def _choose_steps(first, count, rows, at, slope, order_at, order, step):
 
 
 @kernel
+def _choose_powers(first, count, rows, at, value, order_at, order, power):
+    """Set ``power (8,)`` for ``count`` lanes from ``first`` by the greatest weight of each."""
+    for j in range(count):
+        s, most = np.int64(order[order_at + first + j]) if order_at >= 0 else first + j, 0.0
+        for k in range(rows):
+            most = max(most, abs(value[at + ((s // 8) * rows + k) * 8 + s % 8]))
+        power[j] = power_of(most)
+
+
+@kernel
 def _pack_cells(
     cell_start, tile_start, rows, at, value, slope, packed_at, tile_entry, entry_row, packed, packed_slope, places_at,
-    places, order_at, order, slope_step,
+    places, order_at, order, slope_step, power,
 ):  # fmt: skip
     """Fill the arrays of :class:`Packed` from the blocks of cells."""
     e, own, unit = 0, np.zeros((3, 8), np.float32), np.ones(2, np.float32)
@@ -295,12 +314,15 @@ def _pack_cells(
         for t in range(tiles):
             tile_entry[packed_at[c] + t] = first = e
             step = slope_step[packed_at[c] + t] if slope.shape[0] > 0 else unit
+            own_power, count = power[8 * (packed_at[c] + t) :], min(8, size - 8 * t)
+            _choose_powers(8 * t, count, rows[c], at[c], value, order_at[c], order, own_power)
             if slope.shape[0] > 0:
-                _choose_steps(8 * t, min(8, size - 8 * t), rows[c], at[c], slope, order_at[c], order, step)
+                _choose_steps(8 * t, count, rows[c], at[c], slope, order_at[c], order, step)
             for k in range(rows[c]):
-                if not _read_row(8 * t, min(8, size - 8 * t), k, rows[c], at[c], value, slope, order_at[c], order, own):
+                if not _read_row(8 * t, count, k, rows[c], at[c], value, slope, order_at[c], order, own):
                     continue
-                packed[8 * e : 8 * e + 8] = own[0]
+                for j in range(8):
+                    put(packed, e, j, own[0, j] * 2.0 ** -np.int64(own_power[j]))
                 if slope.shape[0] > 0:
                     for j in range(8):
                         packed_slope[16 * e + j] = np.int16(np.rint(own[1, j] / step[0]))

@@ -19,6 +19,7 @@ VECTOR = ir.VectorType(ir.FloatType(), LANES)
 INDEX = ir.IntType(32)
 INDICES = ir.VectorType(INDEX, LANES)
 SHORTS = ir.VectorType(ir.IntType(16), LANES)
+OCTETS = ir.VectorType(ir.IntType(8), LANES)
 PAIRS = [k // 2 + k % 2 * LANES for k in range(2 * LANES)]  # x0 y0 x1 y1 ... of two vectors
 
 
@@ -98,6 +99,20 @@ def load(context, builder, kinds, args):
         short = builder.bitcast(builder.gep(data, [args[1]]), SHORTS.as_pointer())
         return builder.sitofp(builder.load(short, align=2), VECTOR)
     return builder.load(_pointer(context, builder, kinds[0], *args), align=4)
+
+
+@_operation(lanes, None, types.intp)
+def load_fixed(context, builder, kinds, args):
+    """Load eight fixed-point numbers from ``array[index : index + 24]`` of uint8: the whole part of each, rounded down,
+    as 16 signed bits, the lower byte first; then what is to be added to each, in 256ths, as 8 bits. float32 holds the
+    sums exactly."""
+    start = builder.gep(context.make_array(kinds[0])(context, builder, args[0]).data, [args[1]])
+    rest = builder.gep(start, [ir.IntType(types.intp.bitwidth)(2 * LANES)])
+    whole = builder.load(builder.bitcast(start, SHORTS.as_pointer()), align=1)
+    part = builder.load(builder.bitcast(rest, OCTETS.as_pointer()), align=1)
+    step = ir.Constant(VECTOR, [1.0 / 256.0] * LANES)
+    scaled = builder.fmul(builder.uitofp(part, VECTOR), step, flags=FLAGS)
+    return builder.fadd(scaled, builder.sitofp(whole, VECTOR), flags=FLAGS)
 
 
 @_operation(lanes, None, types.intp, None, types.intp)

@@ -44,5 +44,7 @@ def test_denominators_are_sums_of_weights() -> None:
         mine = deformation._arrays["inv_w"][8 * lists.tile_start[c] :][:size]
         if packed.order_at[c] >= 0:
             total, moved = total[packed.order[packed.order_at[c] :][:size]], moved + 1
+        if packed.packed_at[c] >= 0:
+            mine = np.ldexp(mine, -packed.power[8 * packed.packed_at[c] :][:size])
         assert np.allclose(mine, 1 / total, rtol=1e-5), first
     assert moved

@@ -82,7 +82,8 @@ def test_sums_are_those_of_the_blending_functions(kind: str, normals: bool) -> N
     for c in np.flatnonzero(kept[kind]):
         lanes = lanes_of(deformation, c)
         held = slice(8 * starts[c], 8 * starts[c] + len(lanes))
-        np.testing.assert_allclose(arrays["inv_w"][held], 1.0 / sums[0, lanes], rtol=1e-5)
+        power = powers_of(deformation, c)[: len(lanes)]
+        np.testing.assert_allclose(np.ldexp(arrays["inv_w"][held], -power), 1.0 / sums[0, lanes], rtol=1e-5)
         assert (arrays["inv_w"][held.stop : 8 * starts[c + 1]] == 1.0).all()  # lanes that fill up the last tile
         if normals:
             slopes = arrays["dw"][16 * starts[c] : 16 * starts[c + 1]].reshape(-1, 2, 8).transpose(1, 0, 2)
@@ -90,8 +91,8 @@ def test_sums_are_those_of_the_blending_functions(kind: str, normals: bool) -> N
             near = {"atol": 1e-4 * scale, "rtol": 1e-4} if kind == "packed" else {"atol": 1e-5 * scale, "rtol": 1e-5}
             slopes = slopes * steps_of(deformation, c)
             np.testing.assert_allclose(slopes.reshape(2, -1)[:, : len(lanes)], sums[1:, lanes], **near)
-        if kind == "packed" and normals:
-            heaviest_steps(deformation, c, weights[:, lanes], arrays["heavy"][c])
+        if kind == "packed":
+            heaviest_steps(deformation, c, weights[: 1 + 2 * normals, lanes], arrays["heavy"][c])
         elif kind != "factors":
             assert arrays["heavy"][c] == pytest.approx(heaviest[lanes].max(), rel=1e-5)
         else:
@@ -107,12 +108,23 @@ def steps_of(deformation: Deformation[DCPSurface], c: int) -> np.ndarray:
     return packed.slope_step[packed.packed_at[c] :][:tiles].T[..., None]
 
 
+def powers_of(deformation: Deformation[DCPSurface], c: int) -> np.ndarray:
+    """The exponents of a cell's lanes times whose powers of two weights are kept; 0 where they are kept as they are."""
+    packed, tiles = deformation.storage.packed, int(np.diff(deformation.lists.tile_start)[c])
+    if packed.packed_at[c] < 0:
+        return np.zeros(8 * tiles, np.int16)
+    return packed.power[8 * packed.packed_at[c] :][: 8 * tiles]
+
+
 def heaviest_steps(deformation: Deformation[DCPSurface], c: int, weights: np.ndarray, found: float) -> None:
     """The greatest sum of the numbers that kernels multiply by places: ``weights (3, lanes, n)``, of derivatives in
-    steps."""
-    steps = np.repeat(steps_of(deformation, c)[..., 0], 8, axis=1)[:, : weights.shape[1]]
+    steps, or ``(1, lanes, n)`` without these."""
     sums = np.abs(weights).sum(axis=2)
-    assert found == pytest.approx(max(sums[0].max(), (sums[1:] / steps).max()), rel=1e-3)
+    units = np.ldexp(1.0, powers_of(deformation, c)[None, : weights.shape[1]])
+    if len(weights) > 1:
+        steps = np.repeat(steps_of(deformation, c)[..., 0], 8, axis=1)[:, : weights.shape[1]]
+        units = np.concatenate([units, steps])
+    assert found == pytest.approx((sums / units).max(), rel=1e-3)
 
 
 def heaviest_group(deformation: Deformation[DCPSurface], c: int, normals: bool) -> float:

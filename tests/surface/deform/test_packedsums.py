@@ -7,14 +7,16 @@ import pytest
 from numba import njit
 
 from surface.deform import packedsums
-
-PAD = 8 * 8 * 16  # numbers after the weights, which are prefetched
+from surface.deform.fixed import take_all
 
 
 def entries(count: int, rows: int = 12) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Weights (8 k,) and slopes (16 k,) of so many entries, the row of each, and places of the rows (rows + 1, 3)."""
+    """Weights (24 k,) uint8 and slopes (16 k,) of so many entries, the row of each, and places of the rows (rows + 1,
+    3)."""
     rng = np.random.default_rng(count)
-    weights, slopes = (rng.normal(size=k * count + PAD).astype(np.float32) for k in (8, 16))
+    slopes = rng.normal(size=16 * count).astype(np.float32)
+    weights = rng.integers(0, 256, 24 * count).astype(np.uint8)
+    weights.reshape(-1, 24)[:, 1:16:2] = rng.choice([0, 255], (count, 8))  # from -256 to 256
     return weights, slopes, rng.integers(0, rows, count).astype(np.uint16), rng.normal(size=(rows + 1, 3)).astype("f4")
 
 
@@ -35,9 +37,11 @@ def test_a_tile_sums_its_own_entries(first: int, end: int) -> None:
     values, everything = np.full(24, np.nan, np.float32), np.full(72, np.nan, np.float32)
     run_sums(weights, slopes, row, first, end, local, values, everything)
     places = local[row[first:end]].astype(np.float64)
-    own = weights[8 * first : 8 * end].reshape(-1, 8).astype(np.float64)
+    own = take_all(weights[24 * first : 24 * end]).astype(np.float64)
     along = slopes[16 * first : 16 * end].reshape(-1, 2, 8).astype(np.float64)
     wanted = np.stack([each.T @ places for each in (own, along[:, 0], along[:, 1])])  # (3, 8, 3)
+    wanted[0] /= 256.0
+    values, everything[:24] = values / 256.0, everything[:24] / 256.0
     np.testing.assert_allclose(values.reshape(8, 3), wanted[0], atol=5e-6)
     np.testing.assert_allclose(everything.reshape(3, 8, 3), wanted, atol=5e-6)
 
@@ -87,7 +91,7 @@ def test_a_difference_is_added_in_the_tiles_that_its_point_reaches(slopes: bool)
     assert touched.tolist() == [0, 0, 0, 1, 0, 1, 0]
     wanted = np.ones((7, size // 24, 3, 8))
     for tile, entry in ((3, 1 + 1), (5, 7)):
-        kinds = [weights[8 * entry : 8 * entry + 8], *along[16 * entry : 16 * entry + 16].reshape(2, 8)]
+        kinds = [*take_all(weights[24 * entry : 24 * entry + 24]), *along[16 * entry : 16 * entry + 16].reshape(2, 8)]
         for k in range(size // 24):
             wanted[tile, k] += d[:, None] * kinds[k]
     np.testing.assert_allclose(numerators.reshape(wanted.shape), wanted, rtol=1e-5, atol=1e-6)

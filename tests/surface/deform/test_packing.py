@@ -9,6 +9,7 @@ import shapes
 from surface import DCPSurface, Domain
 from surface.deform import packing
 from surface.deform.deformation import Deformation
+from surface.deform.fixed import take_all
 from surface.deform.lists import LANES, Lists, build_lists
 from surface.mesh.mesh import Mesh
 
@@ -34,7 +35,8 @@ def test_unpacked_blocks_are_the_blocks_that_were_packed(normals: bool) -> None:
     for c in held:
         blocks = packing.unpack_cell(lists, made, int(c))
         size = lists.rows[c] * (lists.tile_start[c + 1] - lists.tile_start[c]) * LANES
-        assert np.array_equal(blocks[0].ravel(), lists.value[lists.at[c] :][:size])
+        missed = np.abs(blocks[0].ravel() - lists.value[lists.at[c] :][:size]).reshape(blocks[0].shape)
+        assert (missed <= 2.0**-23 * blocks[0].max(axis=1, keepdims=True)).all()  # of each vertex's greatest weight
         assert len(blocks) == 1 + normals
         if normals:
             slopes = lists.slope[2 * lists.at[c] :][: 2 * size].reshape(-1, 2, LANES)
@@ -82,8 +84,10 @@ def test_the_largest_derivatives_stay_within_16_bits_whichever_way_they_are_roun
 def test_no_entry_is_all_zero_and_every_row_knows_its_entries() -> None:
     lists = build_lists(*body(), False)
     order, made = packed(lists)
-    assert made.packed.reshape(-1, LANES).any(axis=1).all()
-    assert np.count_nonzero(made.packed) == np.count_nonzero(lists.value[np.repeat(made.packed_at >= 0, sizes(lists))])
+    weights, held = take_all(made.packed), np.repeat(made.packed_at >= 0, sizes(lists))
+    assert len(weights) == sum(order.entries[made.packed_at >= 0])
+    few = np.count_nonzero(lists.value[held]) - np.count_nonzero(weights)  # less than half a step
+    assert 0 <= few <= np.count_nonzero((lists.value[held] > 0.0) & (lists.value[held] < 2.0**-23 * lists.value.max()))
     for c in np.flatnonzero(made.packed_at >= 0):
         tiles = int(lists.tile_start[c + 1] - lists.tile_start[c])
         starts = made.tile_entry[made.packed_at[c] :][: tiles + 1]
@@ -116,7 +120,7 @@ def test_vertices_are_put_where_they_share_points() -> None:
     order, made = packed(lists)
     assert order.moved.tolist() == [True] and order.entries.tolist() == [4]
     assert order.order.tolist() == [*range(0, 16, 2), *range(1, 16, 2)]
-    assert (made.packed != 0).all()
+    assert (take_all(made.packed) != 0).all()
 
 
 def test_cells_without_zeros_keep_blocks() -> None:

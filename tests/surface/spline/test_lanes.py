@@ -46,6 +46,20 @@ def test_short_numbers_are_loaded_as_they_are() -> None:
     assert out.tolist() == shorts[3:11].tolist()
 
 
+def test_fixed_point_numbers_are_whole_parts_and_256ths() -> None:
+    @njit
+    def loaded(octets, out):
+        lanes.store(out, 0, lanes.load_fixed(octets, 3))
+
+    numbers = np.array([0.0, 1.0, -1.0, 32767 + 255 / 256, -32768.0, 1 / 256, -1 / 256, 300.5])
+    whole = np.floor(numbers)
+    upper = np.frombuffer(whole.astype("<i2").tobytes(), np.uint8)
+    octets = np.concatenate([[9, 9, 9], upper, 256 * (numbers - whole)])
+    out = np.empty(8, np.float32)
+    loaded(octets.astype(np.uint8), out)
+    assert out.tolist() == numbers.tolist()
+
+
 def test_the_greatest_of_three_and_whether_any_lane_reaches_a_number() -> None:
     @njit
     def largest(a, b, c, out):
