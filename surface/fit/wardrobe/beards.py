@@ -26,7 +26,7 @@ _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips i
 _LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
 _FIELD_MM = -7.0, 11.0  # inside the beard's lines: where stubble begins, and where it is dense
 _DENSER = 1.3  # hair over the lip, which is too short to lie over what is beside it
-_WIDE_MM = 9.0  # inside its lines, where a beard is dense
+_WIDE_MM = 6.0  # inside its lines, where a beard is dense
 _LIP_MM = 1.6  # the same over the lip
 _FAN = 0.3  # by how much narrower the moustache's roots lie than its tips: hairs lie outwards from the middle
 _BEHIND = 0.8  # mm inside the beard's end at the ear for a degree: there it thins out slowly
@@ -74,7 +74,7 @@ def garment(skin: Skin, beard: Beard) -> list[Patches]:
     """Shells, the outermost first: those of cheeks, jaw and chin, and those of the upper lip."""
     wide = _EDGE_DEG * (1.0 - 2.0 * greville(31, 2))  # so that the outside is outside
     main = _grid(skin, wide, np.interp(np.abs(wide), _ANGLES, _BELOW), np.interp(np.abs(wide), _ANGLES, _LOWER), 11)
-    narrow = 25.0 * (1.0 - 2.0 * greville(13, 2))
+    narrow = 27.0 * (1.0 - 2.0 * greville(13, 2))
     top = np.interp((1.0 - _FAN) * np.abs(narrow), _ANGLES, _UPPER)
     lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _ANGLES[:5], _LIP), 5, _FAN)
     out = []
@@ -138,8 +138,8 @@ def _shell(
     s, t = np.meshgrid(s, t, indexing="ij")
     openness = 0.72 + 0.28 * share + 0.0 * s
     if over_lip:
-        openness = 0.75 * openness
-        reached = reached * step(np.minimum(s, 1.0 - s), 0.0, 0.14) * (1.0 - 0.8 * step(t, 0.65, 1.0))
+        openness = 0.9 * openness
+        reached = reached * step(np.minimum(s, 1.0 - s), 0.0, 0.05) * (1.0 - 0.8 * step(t, 0.65, 1.0))
     else:
         reached = reached * step(t, 0.0, 0.1)
     along = (t * length - _ROOTS_MM * _SHORTER * np.exp(-t * length / _ROOTS_MM)) / beard.grain
@@ -160,7 +160,7 @@ def _reached(places: Floats, full_mm: float, share: float) -> Floats:
     out = step(deep, -0.3 * full_mm, 1.2 * full_mm)
     x, y, z = places.T
     lip = step(y, -36.0, -30.0) * step(z, 70.0, 80.0)
-    thinner = 0.3 * step(np.abs(x), 18.0, 31.0) + 0.2 * np.exp(-((x / 2.0) ** 2))
+    thinner = 0.12 * step(np.abs(x), 18.0, 31.0) + 0.2 * np.exp(-((x / 2.0) ** 2))
     return np.asarray(out * (1.0 - lip * thinner))
 
 

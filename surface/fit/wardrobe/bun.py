@@ -23,6 +23,7 @@ LAYERS = (
 BUN_LAYERS = (Layer(1.04, 0.5, 1.0, 6.0), Layer(1.0, 6.6, 0.82, 0.2))
 UNDER_MM = 8.0  # from the middle of the bun's base: there strands of the skull end, well below the coil
 FADE_MM = -7.0, 3.0  # short hairs that the tie does not reach: without them the line is cut as with a saw
+_UNEVEN = 0.01  # rad from the crown, by which hair begins sooner or later: along an even line it would be a cap
 _TURNS = 0.62  # of a strand about the bun, from its base to its tip
 
 
@@ -31,7 +32,8 @@ def bun(skin: Skin) -> Style:
     line = Hairline(skin, TIED)
     base = BUN - 14.0 * _OUT
     round_it = np.linspace(np.pi, -np.pi, GUIDES)
-    toward = directions(line.down(round_it) + 0.012, round_it)
+    uneven = _UNEVEN * (np.sin(9.0 * round_it + 1.0) + 0.7 * np.sin(23.0 * round_it))
+    toward = directions(line.down(round_it) + 0.012 + uneven, round_it)
     roots = CENTRE + toward * skin.reach(toward)[:, None]
 
     def thickness(at: Floats) -> Floats:

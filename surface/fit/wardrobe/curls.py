@@ -12,7 +12,8 @@ from surface.fit.wardrobe.skin import Skin
 from surface.fit.wardrobe.styles import BARE, Style, cap, denser, step
 
 _CURL = 1.0 / 30.0  # tiles of the noise for a mm: curls of a few mm
-_ROUND_MM = 44.0  # inside the line, over which a cloud of curls grows round
+_FLAT_MM = 6.0  # inside the line, over which curls lie on the skin and begin to cover it
+_ROUND_MM = 40.0  # further inside, over which a cloud of curls grows round
 _STEADY = 0.2  # of the shader strand.frag, which stretches the noise along strands by its reciprocal
 
 
@@ -33,7 +34,7 @@ def afro(skin: Skin) -> Style:
 
     def thickness(at: Floats) -> Floats:
         full = 8.0 + 15.0 * step(at[:, 1], 15.0, 95.0)  # close round the ears and at the nape
-        within = np.clip(line.inside(at) / _ROUND_MM, 0.0, 1.0)
+        within = np.clip((line.inside(at) - _FLAT_MM) / _ROUND_MM, 0.0, 1.0)
         return np.asarray(0.8 + full * within * (2.0 - within))  # rises at once, at half a right angle: no brim
 
     layers = (1.0, 0.42), (0.94, 0.60), (0.86, 1.4)

@@ -22,10 +22,15 @@ POINTS = np.array(
 RECEDED = np.vstack(
     [[(0, 122, 76), (14, 124, 71), (28, 129, 50), (42, 124, 38), (54, 108, 40), (63, 86, 45), (68, 64, 47)], POINTS[6:]]
 )
-#: The same where hair is drawn back: close above the ears' roots and behind them, and higher at the nape.
-TIED = np.vstack(
-    [POINTS[:5], [(66, 62, 56), (72, 49, 46), (77, 37, 36), (80, 33, 26), (81, 37, 14), (81, 38, 2), (80, 35, -8),
-                  (76, 20, -15), (68, -6, -22), (56, -34, -33), (24, -51, -58), (0, -52, -63)]]
+#: The same where hair is drawn back: with a point over the forehead's middle, close above the ears' roots and behind
+#: them, and higher at the nape.
+TIED = np.array(
+    [
+        (0, 107, 87), (9, 110, 86), (22, 113, 82), (38, 109, 71), (51, 97, 63), (60, 80, 61), (66, 62, 56),
+        (72, 49, 46), (77, 37, 36), (80, 33, 26), (81, 37, 14), (81, 38, 2), (80, 35, -8), (76, 20, -15),
+        (68, -6, -22), (56, -34, -33), (24, -51, -58), (0, -52, -63),
+    ],
+    float,
 )  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,12 +17,13 @@ CROWN = np.array([12.0, 132.0, -42.0])
 RING_RAD = 0.05  # from the crown, seen from the skull's middle: where guides leave it
 GUIDES = 73
 CLOSE_MM = 0.9, 0.4  # over the skin, where hair ends at the line: at the sides and over the forehead
+_FLAT_MM = 2.0  # inside the line, over which hair that is swept back lies on the skin and begins to cover it
 _SPREADS, _EVEN = 3, 0.75  # how often guides are spread, and how evenly each time
 WEAVE = Weave((73, 12), (97, 15), (49, 9), 0.35)
 FRINGED = (Layer(1.08, 0.42, 1.0, 40.0), Layer(1.0, 0.66, 0.92, 24.0), Layer(0.90, 1.8, 0.80, 13.0))
 SWEPT = (
-    Layer(1.10, 0.44, 1.0, 30.0, cropped_mm=7.0), Layer(1.0, 0.70, 0.92, 24.0, cropped_mm=7.0),
-    Layer(0.88, 1.8, 0.80, 14.0, cropped_mm=7.0),
+    Layer(1.10, 0.44, 1.0, 12.0, cropped_mm=7.0), Layer(1.0, 0.70, 0.92, 9.0, cropped_mm=7.0),
+    Layer(0.88, 1.8, 0.80, 6.0, cropped_mm=7.0),
 )  # fmt: skip
 
 
@@ -41,8 +42,7 @@ class Sweep:
 
 
 BACK = Sweep(POINTS, 2.2, 6.5, 6.5, 0.45, 22.0, SWEPT)
-THIN = Sweep(RECEDED, 2.6, 3.6, 0.8, 0.25, 34.0, tuple(replace(each, fray_mm=0.4 * each.fray_mm) for each in SWEPT))
-"""What is left over the forehead lies flat and reaches the skin: a lock whose ends are few stands off it."""
+THIN = Sweep(RECEDED, 2.6, 3.6, 0.8, 0.25, 34.0, SWEPT)
 
 
 def short(skin: Skin) -> Style:
@@ -93,7 +93,7 @@ def _swept_back(skin: Skin, sweep: Sweep, seed: int) -> Style:
         front = sweep.front_mm * step(at[:, 2], 10.0, 60.0)
         full = sweep.sides_mm + _top(at) * (sweep.top_mm - sweep.sides_mm + front)
         close = CLOSE_MM[0] + (CLOSE_MM[1] - CLOSE_MM[0]) * step(at[:, 2], 35.0, 60.0)
-        return np.asarray(close + full * step(line.inside(at), -3.0, sweep.rise_mm) ** 0.8)
+        return np.asarray(close + full * step(line.inside(at), _FLAT_MM, sweep.rise_mm) ** 0.8)
 
     def flow(at: Floats, normals: Floats, share: float) -> Floats:
         away = tangent(at - CROWN, normals)
