@@ -20,6 +20,8 @@ TIPS_Y = -124.0  # mm
 OVER_EAR_MM = 11.0
 _LEVELLED = 2.5, 1.5, 0.0  # guides and places along them, over which those that hang are levelled
 _HANGS_Y = 55.0, 95.0  # mm: where they hang, and where they do not yet
+_WAVE_MM, _WAVE_DEEP_MM = 88.0, 3.4  # how long waves of hair that hangs are, and how far they go at most
+_TURNS_IN_MM = 30.0, 9.0  # of its end, that turns in, and by how much
 FRAYED = 0.09, 0.0  # of the width, at the face and behind
 LAYERS = (
     Layer(1.07, 0.46, 1.0, 45.0, 0.1), Layer(1.0, 0.66, 0.92, 30.0, 0.1), Layer(0.88, 1.6, 0.74, 16.0),
@@ -77,6 +79,18 @@ def _hung(paths: Floats, side: float) -> Floats:
     return np.asarray(paths + hangs * apart * (level - paths))
 
 
+def _waved(paths: Floats, side: float) -> Floats:
+    """Guides (g, k, 3) of one side in slight waves, that grow from where they hang to their ends, which turn in: locks
+    are out of step with those further on, since hair that falls in one plane looks like a board."""
+    x, y, z = np.moveaxis(paths, 2, 0)
+    free, ends = step(-y, -35.0, 40.0), step(-y, -TIPS_Y - _TURNS_IN_MM[0], -TIPS_Y)
+    which = np.linspace(0.0, 1.0, len(paths))[:, None]
+    way = 2.0 * np.pi * (y / _WAVE_MM + 0.9 * np.sin(5.0 * which))
+    wave = _WAVE_DEEP_MM * free * np.sin(way)
+    outwards = side * (wave - _TURNS_IN_MM[1] * ends)
+    return np.stack([x + outwards, y, z + 0.8 * _WAVE_DEEP_MM * free * np.cos(way)], axis=2)
+
+
 def _inside(a: Floats, b: Floats, c: Floats) -> bool:
     """Does b lie below the line from a to c?"""
     return bool((b[0] - a[0]) * (c[1] - a[1]) >= (b[1] - a[1]) * (c[0] - a[0]))
@@ -114,7 +128,7 @@ def _curtain(skin: Skin, line: Hairline, side: float) -> list[Patches]:
     length = np.full(len(roots), 430.0)
     comb = Comb(
         roots[order], length, thickness, flow, cut, 7.0, 1.0, steps=72, stiff=0.6, slack=slack, ears=True,
-        drape=lambda paths: _hung(paths, side),
+        drape=lambda paths: _waved(_hung(paths, side), side),
     )  # fmt: skip
     return sheets(
         skin,

@@ -74,3 +74,18 @@ def test_hair_hangs_straight_over_hollows_and_over_ears_without_a_bulge(side: fl
     own, before = side * hung[front, falls, 0], side * paths[front, falls, 0]
     assert np.diff(own, 2).max() < 0.5 and np.diff(before, 2).max() > 5.0  # no hollow
     assert own.max() > before.max() - 4.0
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_hair_that_hangs_waves_and_its_ends_turn_in(side: float) -> None:
+    """Guides alike, straight down from the crown to the shoulders."""
+    y = np.linspace(120.0, TIPS_Y, 60)
+    paths = np.tile(np.stack([side * 80.0 + 0.0 * y, y, 0.0 * y], axis=-1), (20, 1, 1))
+    waved = module._waved(paths, side)
+    np.testing.assert_array_equal(waved[:, y > 40.0], paths[:, y > 40.0])
+    out, inner = side * (waved - paths)[..., 0], y > TIPS_Y + module._TURNS_IN_MM[0]
+    assert (np.abs(out[:, inner]) <= module._WAVE_DEEP_MM).all()
+    hangs = out[:, inner & (y < -35.0)]
+    assert (np.ptp(hangs, axis=1) > 4.0).all()  # a wave, out and in
+    assert np.ptp(hangs, axis=0).max() > 5.0  # of locks that are out of step
+    assert (out[:, -1] < module._WAVE_DEEP_MM - module._TURNS_IN_MM[1]).all()
