@@ -31,7 +31,7 @@ def power_of(most):
 def put(table, k, lane, number):
     """Write ``number`` to ``lane`` of the k-th eight of ``table (24 n,)`` uint8, rounded to a step; the greatest there
     is if it is greater."""
-    steps, at = min(np.int64(np.rint(256.0 * number)), MOST), 24 * k
+    steps, at = np.int64(min(np.rint(256.0 * number), MOST)), 24 * k
     table[at + 2 * lane] = (steps >> 8) & 255
     table[at + 2 * lane + 1] = (steps >> 16) & 255
     table[at + 16 + lane] = steps & 255

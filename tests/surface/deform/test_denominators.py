@@ -195,3 +195,17 @@ def test_how_far_points_may_be_away_depends_on_weights_above_one() -> None:
     assert farthest(np.array([0.1, 0.5])) == MAX_SUM == farthest(np.zeros(0))
     assert farthest(np.array([2.0, 8.0, 4.0])) == MAX_SUM / 8.0
     assert 10.0 * MAX_SUM < float(np.finfo(np.float32).max) < 100.0 * MAX_SUM
+
+
+@pytest.mark.parametrize(("scale", "usable"), [(1e-34, True), (1e-39, False)])
+def test_packed_weights_that_add_up_to_nearly_nothing_are_refused(scale: float, usable: bool) -> None:
+    plain = shapes.scattered(60, 2)
+    mesh = plain.tessellate(chord_error=0.1, max_depth=4)
+    surface = DCPSurface(plain.points, scale * plain.weights, list(plain.knots_u), list(plain.knots_v))
+    if not usable:
+        with pytest.raises(ValueError, match="nearly nothing"):
+            Deformation(surface, mesh, normals=False)
+        return
+    deformation = Deformation(surface, mesh, normals=False)
+    assert (deformation.storage.packed.packed_at >= 0).any()
+    assert np.abs(deformation.vertices - plain.evaluate(mesh.uv)).max() < 1e-5
