@@ -197,15 +197,17 @@ def test_how_far_points_may_be_away_depends_on_weights_above_one() -> None:
     assert 10.0 * MAX_SUM < float(np.finfo(np.float32).max) < 100.0 * MAX_SUM
 
 
-@pytest.mark.parametrize(("scale", "usable"), [(1e-34, True), (1e-39, False)])
-def test_packed_weights_that_add_up_to_nearly_nothing_are_refused(scale: float, usable: bool) -> None:
-    plain = shapes.scattered(60, 2)
-    mesh = plain.tessellate(chord_error=0.1, max_depth=4)
-    surface = DCPSurface(plain.points, scale * plain.weights, list(plain.knots_u), list(plain.knots_v))
-    if not usable:
-        with pytest.raises(ValueError, match="nearly nothing"):
-            Deformation(surface, mesh, normals=False)
-        return
-    deformation = Deformation(surface, mesh, normals=False)
-    assert (deformation.storage.packed.packed_at >= 0).any()
-    assert np.abs(deformation.vertices - plain.evaluate(mesh.uv)).max() < 1e-5
+def test_a_sum_of_packed_weights_is_judged_with_its_power_of_two() -> None:
+    deformation = deformed("packed", False)
+    arrays, packed, starts = deformation._arrays, deformation.storage.packed, deformation.lists.tile_start
+    cells = np.flatnonzero(packed.packed_at >= 0)
+    sums = dense(deformation)[0].sum(axis=1)
+    smaller = round(np.log2(np.median(sums) / MIN_SUM))
+    packed.power -= smaller
+    module.denominators(deformation._addresses, cells)
+    refused, below = list[bool](), list[bool]()
+    for c in cells:
+        lanes = lanes_of(deformation, c)
+        refused += np.isinf(arrays["inv_w"][8 * starts[c] :][: len(lanes)]).tolist()
+        below += (np.ldexp(sums[lanes], -smaller) < MIN_SUM).tolist()
+    assert refused == below and 0 < sum(below) < len(below)
