@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from surface.view.scene.theme import Colour, Theme  # imported lazily: the body draws nothing
 
 Strength = Annotated[float, Field(ge=0, le=4)]
-CameraName = Literal["front", "three_quarter", "three_quarter_right", "profile", "profile_right"]
+CameraName = Literal["front", "three-quarter", "three-quarter-right", "profile", "profile-right"]
 _WARMTH_FACTOR = 0.35  # relative change of red and blue by a warmth of 1
 
 
@@ -52,9 +52,9 @@ class PictureSettings(Settings):
 
     @field_validator("camera", mode="before")
     @classmethod
-    def _replace_hyphens(cls, name: object) -> object:
-        """Accept ``three-quarter`` for ``three_quarter``."""
-        return name.replace("-", "_") if isinstance(name, str) else name
+    def _replace_underscores(cls, name: object) -> object:
+        """Accept ``three_quarter`` for ``three-quarter``."""
+        return name.replace("_", "-") if isinstance(name, str) else name
 
     def make_theme(self) -> Theme:
         """Return the theme with this background and these lights."""
@@ -94,7 +94,7 @@ class PictureSettings(Settings):
         """Return the camera called ``camera``."""
         from surface.view.scene.camera import PRESETS  # imported lazily: the body draws nothing
 
-        return PRESETS[self.camera.replace("_", "-")]()
+        return PRESETS[self.camera]()
 
 
 def with_options(settings: PictureSettings, wanted: Mapping[str, object]) -> Any:

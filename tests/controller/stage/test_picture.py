@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import pytest
 from pydantic import ValidationError
 
 from controller.base.errors import ParameterError
-from controller.stage.picture import LightSettings, PictureSettings, parse_background, with_options
+from controller.stage.picture import CameraName, LightSettings, PictureSettings, parse_background, with_options
 from surface.view.scene.camera import PRESETS
 from surface.view.scene.theme import THEMES
 
@@ -108,3 +110,10 @@ def test_warmth_and_strength_are_those_of_the_colours() -> None:
     theme = PictureSettings(background=("#336699", "#0a141e")).make_theme()
     assert theme.background_top == pytest.approx((0x33 / 255, 0x66 / 255, 0x99 / 255))
     assert theme.background_bottom == pytest.approx((10 / 255, 20 / 255, 30 / 255))
+
+
+def test_cameras_are_named_with_hyphens_and_found_with_underscores_too() -> None:
+    assert PictureSettings.model_validate({"camera": "three_quarter"}).camera == "three-quarter"
+    assert {*get_args(CameraName)} == {*PRESETS}
+    with pytest.raises(ValidationError, match="three-quarter-right"):
+        PictureSettings.model_validate({"camera": "left"})
