@@ -1,7 +1,8 @@
 """Let lids follow the gaze where the mesh has no shapes that do so: looks down and up are made from its blink.
 
-Lids turn about the eyeball's x axis. The upper lid and what hangs on it, such as lashes, goes as the blink takes it;
-the lower lid, which blinks hardly move, as far round the eyeball as a lengthened blink does.
+Lids turn about the eyeball's x axis. The upper lid and what hangs on it, such as lashes, goes the way of the blink; the
+lower lid, which blinks hardly move, as far round the eyeball as a lengthened blink does. It draws on the cheek, so
+under eyes that are larger than people's, as drawn ones are, it goes no more millimetres than under those.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 from surface.base.arrays import Bools, Floats
 from surface.fit.eyes.blink import FADE_RAD, MAX_LEFT_OPEN, LidEdges, angle_of, lid_edges
 from surface.fit.eyes.openings import Opening
+from surface.fit.eyes.pieces import USUAL_SIZE
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.names import sources_of
 from surface.head.model.parameters import EYE_RAD, smoothstep
@@ -30,7 +32,8 @@ MIN_WAY_RAD = 0.1  # of the upper lid's edge in a blink: what is less is none
 class _Lids:
     """What of a mesh (n vertices) goes with the lids of one eye.
 
-    upper : (n,) rad, down, by which the blink turns what belongs to the upper lid. way : rad, of its edge at most.
+    upper : (n, 3) how the blink moves what belongs to the upper lid, as polar coordinates about the eye's x axis: mm
+        along x, mm away from the axis, rad up. way : rad, of its edge at most.
     lower : (n,) rad, the opening's height in the column of every vertex, as far as the vertex goes with the lower lid.
     height : rad, the opening's greatest.
     """
@@ -48,13 +51,15 @@ def follow_gaze(mesh: FitMesh, openings: list[Opening], eyes: Floats, radius: fl
     first, and radius, mm. Lids of an eye that no blink of its upper lid shuts stay as they are.
     """
     deltas, made, sources = mesh.deltas.copy(), list[str](), sources_of(mesh.names)
+    size = min(1.0, USUAL_SIZE * float(np.linalg.norm(eyes[0] - eyes[1])) / radius)
     for opening, eye in zip(openings, eyes, strict=True):
         rest = mesh.vertices - eye
         still = [n for n in LOOKS if _is_still(mesh, sources[f"{n}{opening.side}"], opening, rest)]
         lids = _lids(mesh, sources.get(f"eyeBlink{opening.side}", []), opening, rest, radius) if still else None
         for name in still if lids else ():
             made.append(f"{name}{opening.side}")
-            deltas[sources[made[-1]][0]] += _turned(rest, _turn(lids, *LOOKS[name]))
+            upper, lower = LOOKS[name]
+            deltas[sources[made[-1]][0]] += _moved(rest, lids, upper, size * lower)
     notes = [f"lids follow the gaze in {', '.join(made)}: made from blinks, as the mesh moves no lids there"]
     return replace(mesh, deltas=deltas), notes if made else []
 
@@ -75,15 +80,21 @@ def _lids(mesh: FitMesh, blink: list[int], opening: Opening, rest: Floats, radiu
     most = float((before.upper - after.upper).max())
     if float(after.gap.max()) > MAX_LEFT_OPEN * float(before.gap.max()) or most < MIN_WAY_RAD:
         return None
-    near, turned = _near(rest, radius), angle_of(rest) - angle_of(shut)
+    near, moves = _near(rest, radius), _polar(shut) - _polar(rest)
     way, upper, lower, height = (
         _in_column(rest, before, at)
         for at in (before.upper - after.upper, before.upper, before.lower, np.maximum(before.gap, 0.0))
     )
     above = 2.0 * angle_of(rest) >= upper + lower
-    is_upper: Bools = above | (turned > AS_THE_BLINK * np.maximum(way, MIN_WAY_RAD))
+    is_upper: Bools = above | (-moves[:, 2] > AS_THE_BLINK * np.maximum(way, MIN_WAY_RAD))
     follows = np.where(is_upper, 0.0, 1.0 - smoothstep(lower - angle_of(rest), 0.0, FADE_RAD))
-    return _Lids(np.where(is_upper, turned, 0.0) * near, most, follows * near * height, float(before.gap.max()))
+    moves *= np.where(is_upper, near, 0.0)[:, None]
+    return _Lids(moves, most, follows * near * height, float(before.gap.max()))
+
+
+def _polar(points: Floats) -> Floats:
+    """(n, 3) points as x, distance from the x axis, and angle about it, 0 ahead, + up."""
+    return np.column_stack([points[:, 0], np.hypot(points[:, 1], points[:, 2]), angle_of(points)])
 
 
 def _near(rest: Floats, radius: float) -> Floats:
@@ -98,17 +109,14 @@ def _in_column(rest: Floats, edges: LidEdges, values: Floats) -> Floats:
     return np.interp(rest[:, 0], edges.x, values)
 
 
-def _turn(lids: _Lids, upper: float, lower: float) -> Floats:
-    """(n,) angle by which everything turns, rad, + up, in a look that takes the lids by shares of the opening's height.
-    No lid turns further than the eye itself, and the upper one no further than in a blink."""
+def _moved(rest: Floats, lids: _Lids, upper: float, lower: float) -> Floats:
+    """(n, 3) displacements, mm, in a look that takes the lids by shares of the opening's height, + up.
+
+    No lid turns further than the eye itself, and the upper one no further than in a blink.
+    """
     less = min(1.0, EYE_RAD[1] / (abs(upper) * lids.height))
-    blink = min(abs(upper) * lids.height * less / lids.way, 1.0)
-    out: Floats = np.sign(upper) * blink * lids.upper + less * lower * lids.lower
-    return out
-
-
-def _turned(rest: Floats, turn: Floats) -> Floats:
-    """(n, 3) displacements by turns (n,) about the eye's x axis."""
-    c, s = np.cos(turn), np.sin(turn)
-    y, z = c * rest[:, 1] + s * rest[:, 2], c * rest[:, 2] - s * rest[:, 1]
-    return np.column_stack([np.zeros(len(rest)), y - rest[:, 1], z - rest[:, 2]])
+    blink = -np.sign(upper) * min(abs(upper) * lids.height * less / lids.way, 1.0)
+    x, away, angle = (_polar(rest) + blink * lids.upper).T
+    angle = angle + less * lower * lids.lower
+    moved = np.column_stack([x, away * np.sin(angle), away * np.cos(angle)])
+    return np.where((lids.upper.any(axis=1) | (lids.lower > 0.0))[:, None], moved - rest, 0.0)
