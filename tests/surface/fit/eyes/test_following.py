@@ -65,7 +65,7 @@ def test_an_upper_lid_goes_no_further_than_in_the_blink(plain, openings):
 
 
 def test_skin_goes_round_the_eye_the_way_of_the_blink_and_far_from_it_nothing_moves(plain, openings):
-    """The lower lid keeps its distance from the eye's axis, the upper one's goes from that at rest to that when shut."""
+    """The lower lid keeps its distance from the eye's axis, the upper one goes from that at rest to that in a blink."""
     blink = plain.deltas[plain.names.index("eyeBlinkLeft")] + [0.5, 0.0, 0.0] * (plain.deltas[:1, :, 1:2].any(axis=2).T)
     mesh = replace(plain, deltas=np.concatenate([blink[None], plain.deltas[1:]]))
     made, _ = followed(mesh, openings)
