@@ -56,7 +56,9 @@ def follow_gaze(mesh: FitMesh, openings: list[Opening], eyes: Floats, radius: fl
         rest = mesh.vertices - eye
         still = [n for n in LOOKS if _is_still(mesh, sources[f"{n}{opening.side}"], opening, rest)]
         lids = _lids(mesh, sources.get(f"eyeBlink{opening.side}", []), opening, rest, radius) if still else None
-        for name in still if lids else ():
+        if lids is None:
+            continue
+        for name in still:
             made.append(f"{name}{opening.side}")
             upper, lower = LOOKS[name]
             deltas[sources[made[-1]][0]] += _moved(rest, lids, upper, size * lower)

@@ -74,8 +74,14 @@ def brought_together(
             np.add.at(moves[own.part], own.ids, np.column_stack([there - now[own.part][own.ids], np.ones(len(there))]))
         for name, m in moves.items():
             now[name] += 0.5 * m[:, :3] / np.maximum(m[:, 3:], 1.0)
-    ids = {name: np.unique(np.concatenate([s.ids for p in pairs for s in p if s.part == name] or [[]])) for name in now}
-    return {name: (own.astype(np.int64), now[name][own.astype(np.int64)]) for name, own in ids.items()}
+    ids = {name: _ids_of(name, pairs) for name in now}
+    return {name: (own, now[name][own]) for name, own in ids.items()}
+
+
+def _ids_of(part: str, pairs: Iterable[tuple[Side, Side]]) -> Ints:
+    """The vertices of a part on any seam, each once."""
+    every = [side.ids for pair in pairs for side in pair if side.part == part]
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *every]))
 
 
 def _between(places: Floats, at: Floats, wanted: Floats) -> Floats:
