@@ -27,7 +27,7 @@ FULL_MOTION = (
 
 
 @dataclass(frozen=True)
-class _Edges:
+class LidEdges:
     """Both lids' edges as angles round the eyeball (COLUMNS,), over evenly spaced x (COLUMNS,)."""
 
     x: Floats
@@ -49,7 +49,7 @@ def shut_blinks(mesh: FitMesh, openings: list[Opening], eyes: Floats, radius: fl
             continue
         rest = mesh.vertices - eye
         move = deltas[indices].sum(axis=0)
-        open_rest, open_shut = (_edges(at, opening.edge, rest) for at in (rest, rest + move))
+        open_rest, open_shut = (lid_edges(at, opening.edge, rest) for at in (rest, rest + move))
         left = float(open_shut.gap.max()) * radius
         if left > MAX_LEFT_OPEN * float(open_rest.gap.max()) * radius:
             continue
@@ -59,12 +59,12 @@ def shut_blinks(mesh: FitMesh, openings: list[Opening], eyes: Floats, radius: fl
     return replace(mesh, deltas=deltas), notes
 
 
-def _angle(local: Floats) -> Floats:
+def angle_of(local: Floats) -> Floats:
     """(n,) angle of points round the eye's x axis, 0 ahead, + up."""
     return np.arctan2(local[:, 1], local[:, 2])
 
 
-def _edges(local: Floats, edge: Ints, rest: Floats) -> _Edges:
+def lid_edges(local: Floats, edge: Ints, rest: Floats) -> LidEdges:
     """The edges of both lids where ``local (n, 3)`` are; upper and lower are distinguished at rest, by the line between
     the corners."""
     at_rest = rest[edge]
@@ -77,8 +77,8 @@ def _edges(local: Floats, edge: Ints, rest: Floats) -> _Edges:
     for own in (above, ~above):
         ids = edge[np.union1d(np.flatnonzero(own), corners)]
         ids = ids[np.argsort(local[ids, 0])]
-        sides.append(np.interp(x, local[ids, 0], _angle(local[ids])))
-    return _Edges(x, *sides)
+        sides.append(np.interp(x, local[ids, 0], angle_of(local[ids])))
+    return LidEdges(x, *sides)
 
 
 def _spread(need: Floats) -> Floats:
@@ -89,7 +89,7 @@ def _spread(need: Floats) -> Floats:
     return out
 
 
-def _moved(rest: Floats, move: Floats, is_upper: Bools, before: _Edges, after: _Edges, radius: float) -> Floats:
+def _moved(rest: Floats, move: Floats, is_upper: Bools, before: LidEdges, after: LidEdges, radius: float) -> Floats:
     """(n,) how much skin follows: as far as the blink itself moves it, by the way of the lid's edge in that column."""
     far, out = np.linalg.norm(move, axis=1), np.ones(len(rest))
     ways = [radius * np.abs(a - b) for a, b in ((before.upper, after.upper), (before.lower, after.lower))]
@@ -101,14 +101,14 @@ def _moved(rest: Floats, move: Floats, is_upper: Bools, before: _Edges, after: _
     return out
 
 
-def _lengthened(rest: Floats, move: Floats, before: _Edges, after: _Edges, radius: float) -> Floats:
+def _lengthened(rest: Floats, move: Floats, before: LidEdges, after: LidEdges, radius: float) -> Floats:
     """(n, 3) what to add to a blink's displacements, so that both edges meet and overlap a little."""
     local = rest + move
     along = (local[:, 0] - after.x[0]) / (after.x[-1] - after.x[0])
     inner = 1.0 - smoothstep(np.maximum(-along, along - 1.0), 0.0, CORNER_FADE)
     overlap = OVERLAP_MM / radius * np.clip(4.0 * before.gap / max(float(before.gap.max()), 1e-9), 0.0, 1.0)
     need = _spread(np.maximum(after.gap + overlap, 0.0))
-    own, angle = np.interp(local[:, 0], after.x, need) * inner, _angle(rest)
+    own, angle = np.interp(local[:, 0], after.x, need) * inner, angle_of(rest)
     upper, lower = (np.interp(rest[:, 0], before.x, side) for side in (before.upper, before.lower))
     is_upper = angle >= 0.5 * (upper + lower)
     off = np.where(is_upper, angle - upper, lower - angle)

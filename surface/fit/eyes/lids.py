@@ -8,6 +8,7 @@ import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.eyes.blink import shut_blinks
+from surface.fit.eyes.following import follow_gaze
 from surface.fit.eyes.search import Eyes
 from surface.fit.points.eyeball import CORNEA
 from surface.fit.points.lid_seating import AHEAD, LID_MM, Eyeball, seat_lids
@@ -25,18 +26,21 @@ NOTE_MM = 1.0  # a lid that is moved further at rest is reported
 def fit_lids(mesh: FitMesh, eyes: Eyes) -> tuple[FitMesh, list[str]]:
     """The mesh with its lids on the eyeballs and shut by blinks, and what was changed, in words.
 
-    Shapes by which eyes look somewhere are added where they are missing: lids give way to the cornea.
+    Shapes by which eyes look somewhere are added where they are missing: lids give way to the cornea, and follow it
+    where a blink shows how they move.
     """
     if eyes.radius <= 0:
         return mesh, []
     mesh = with_looks(mesh)
     shut, notes = shut_blinks(mesh, eyes.openings, eyes.centres, eyes.radius)
+    shut, followed = follow_gaze(shut, eyes.openings, eyes.centres, eyes.radius)
     left, right = ((float(x), float(y), float(z)) for x, y, z in eyes.centres)
     ball = Eyeball(left, eyes.radius, right)
     lids = _lids(mesh, eyes.centres, eyes.radius, eyes.faces)
     least = _least_height(mesh, lids, eyes.radius)
     seated = seat_lids(shut, ball, ball, lids, gazes_of(mesh), under_gaze=True, least=least, cling=False)
     most = float(np.linalg.norm(seated.vertices - mesh.vertices, axis=1).max(initial=0.0))
+    notes += followed
     notes += [f"lids were moved by up to {most:.1f} mm, out of the eyeballs"] if most > NOTE_MM else []
     return seated, notes
 

@@ -20,6 +20,7 @@ from surface.fit.source.placing.frame import AXES, EYES_MM, UNITS
 from surface.fit.source.placing.place import HeadSize
 from surface.fit.transfer.align import Similarity, align, from_pairs
 from surface.fit.transfer.colours import with_colours
+from surface.fit.transfer.detail.broken_neck import without_end
 from surface.fit.transfer.detail.hidden import in_sight
 from surface.fit.transfer.faults import HINT, faults_of_transfer
 from surface.fit.transfer.lashes import rooted_lashes
@@ -113,7 +114,8 @@ def transfer(
     found = find_face(scan, template, picked, options, where)
     found, mirrored = upright(scan, template, found)
     scan, marks = in_frame(scan, template, found), {n: found.points(p) for n, p in picked.items()}
-    samples, done = _registered(scan, template, marks, progress, mirrored=mirrored)
+    axis = np.array(head.data.neck.pivot)
+    samples, done = _registered(scan, template, axis, marks, progress, mirrored=mirrored)
     matcher, shown = Matcher(samples), samples.kept(in_sight(scan, samples.points))
     provenance = {**head.data.provenance, "made": f"omote fit: form of a scan, expressions of the head {head.name!r}"}
     warped = warp_head(head, template, done.warp, done.smooth, matcher, shown, provenance, name)
@@ -149,11 +151,11 @@ def transfer(
 
 
 def _registered(
-    scan: Scan, template: Template, marks: dict[str, Floats], progress: Progress, *, mirrored: bool
+    scan: Scan, template: Template, axis: Floats, marks: dict[str, Floats], progress: Progress, *, mirrored: bool
 ) -> tuple[Samples, Registered]:  # fmt: skip
     """Samples of a scan that is in the head's frame, and the template's registration to them, symmetric if
-    ``mirrored``. marks : landmarks (3,) there."""
-    samples = sample(scan, MANY)
+    ``mirrored``. axis : (3,) within the neck. marks : landmarks (3,) there."""
+    samples = without_end(sample(scan, MANY), scan, axis, float(template.landmarks["chin"][1]))
     progress("face", 0.15)
     done = register(template, samples, marks, lambda share: progress("face", 0.15 + 0.5 * share))
     return samples, symmetrised(done) if mirrored else done

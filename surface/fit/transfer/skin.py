@@ -28,6 +28,9 @@ FOLDED = 0.3  # least cosine between a triangle's normal before and after follow
 UNFOLDINGS, STILL = 4, 0.1  # attempts of a pass to remove folds; weight that keeps skin at folds where the map puts it
 RIM_MM = (1.5, 4.0)  # distance from the rim of an opening where detail of the scan begins to count, and counts fully
 CLOSINGS = 12  # iterations, because each one leaves a share of the gap
+LOOSE, HELD = 3e-4, 1e4  # weights of where skin is, and of where borders are pulled to, relative to SMOOTH's
+SEAM, SEAM_MM = 20.0, 8.0  # weight of seams in the least squares of control points, as their sides are fitted by
+# themselves; distance at which it has faded out
 ON_MM = (1.5, 0.5)  # distance from the nearest sample, and from its tangent plane, of skin that lies on the scan
 FREE_MM = 6.0  # least distance from the rims of openings of skin that goes where the scan lacks it
 FRONT_MM = 6.0  # distance from what the scan shows of the face's front, within which skin stays though it crosses
@@ -62,6 +65,7 @@ class Skin:
         lids = np.abs(lid_share(self.rest, eyes.centres, eyes.radius))
         self._seen = smoothstep(distance, *RIM_MM) * (1.0 - lids)
         self._free = (distance > FREE_MM) & (lids == 0.0)
+        self._weight = np.ones(n)  # in least squares
         self._steps = _steps(self.mesh.triangles, n)
         self._matrix = (self._steps.T @ self._steps).tocsr()
 
@@ -101,6 +105,19 @@ class Skin:
         beside = np.ones(len(self.at), bool) if tree is None else tree.query(self.at)[0] > FRONT_MM * scale
         self.at = uncrossed(self.at, smooth(self.rest), self.rest, self.mesh.triangles, beside & self._free)
 
+    def pull(self, ids: Ints, places: Floats) -> None:
+        """Move vertices ``ids (k,)`` to ``places (k, 3)``, and the skin around them smoothly with them."""
+        if not len(ids):
+            return
+        weight = np.full(len(self.at), LOOSE)
+        weight[ids] = HELD
+        goal = np.zeros_like(self.at)
+        goal[ids] = places - self.at[ids]
+        system = (diags(weight) + SMOOTH * self._matrix).tocsc()
+        self.at = self.at + _solved(system, weight[:, None] * goal)
+        far = cKDTree(places).query(self.at)[0]
+        self._weight = 1.0 + (SEAM - 1.0) * (1.0 - smoothstep(far, 0.0, SEAM_MM))
+
     def _facing(self, at: Floats) -> Floats:
         """(t, 3) unit normals of the skin's triangles over vertices (n, 3)."""
         a, b, c = (at[self.mesh.triangles[:, k]] for k in range(3))
@@ -136,7 +153,7 @@ class Skin:
         part, jaw : the skin, and the path of the jaw, of the head that they come from. Returns the part with more
         control points where they were too far apart; it has its form and expressions as before.
         """
-        fitted = fit_points(part, self.mesh, self.at, self._seen, jaw)
+        fitted = fit_points(part, self.mesh, self.at, self._seen, jaw, self._weight)
         self.surface, self.points, self.at = fitted.surface, fitted.points, fitted.at
         return fitted.part
 

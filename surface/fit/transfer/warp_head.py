@@ -12,6 +12,7 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.fit.transfer.align import face_region
 from surface.fit.transfer.detail.front import on_front
+from surface.fit.transfer.detail.together import brought_together, sides_of
 from surface.fit.transfer.eye_depth import at_scan_depth
 from surface.fit.transfer.place_parts import behind_skin, place_eyes, place_jaw, place_neck, place_teeth
 from surface.fit.transfer.register import Matcher
@@ -82,7 +83,8 @@ def warp_head(
 def _skins(
     head: Head, warp: Warp, smooth: Warp, matcher: Matcher, front: Samples, old: Ball, new: Ball
 ) -> dict[str, Skin]:  # fmt: skip
-    """The visible parts of skin, moved onto the scan, by name; lids are not yet on the eyeballs.
+    """The visible parts of skin, moved onto the scan and with one border at every seam, by name; lids are not yet on
+    the eyeballs.
 
     front : samples of the scan on the front of the face.
     """
@@ -97,6 +99,9 @@ def _skins(
                 skin.cover(matcher, front, scale)
                 skin.uncross(smooth, front, scale)
             out[part.name] = skin
+    sides = sides_of({p.name: p for p in head.parts if p.name in out}, head.data.seams)
+    for name, (ids, places) in brought_together({n: skin.at for n, skin in out.items()}, sides).items():
+        out[name].pull(ids, places)
     return out
 
 

@@ -19,6 +19,14 @@ def ball(radius, centre, n=24):
     return radius * at + centre, np.concatenate([one.reshape(-1, 3), two.reshape(-1, 3)])
 
 
+def sheet(height, up):
+    """Vertices and triangles of a level sheet that faces up or down; the ball's pole lies inside a triangle."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-15.3, 14.9, 17), np.linspace(-14.7, 15.5, 17)))
+    first = np.flatnonzero((x < 14.8) & (y < 15.4))
+    faces = np.concatenate([first[:, None] + [0, 1, 18], first[:, None] + [0, 18, 17]])
+    return np.column_stack([x, y, np.full(len(x), height)]), faces if up else faces[:, ::-1]
+
+
 def joined(*meshes):
     """One mesh of several, with the kind of each triangle: 0 for the first mesh, 1 for the second."""
     starts = np.cumsum([0, *(len(v) for v, _ in meshes)])
@@ -101,11 +109,7 @@ def test_normals_of_a_ball_point_away_from_its_middle():
 @pytest.mark.parametrize("up", [1.0, -1.0])
 def test_what_a_ball_dips_below_a_sheet_lies_as_deep_as_its_height_says(up):
     """The sheet's triangles are not those of a grid in line with the ball's, and face up or down."""
-    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-15.3, 14.9, 17), np.linspace(-14.7, 15.5, 17)))
-    first = np.flatnonzero((x < 14.8) & (y < 15.4))
-    sheet = np.concatenate([first[:, None] + [0, 1, 18], first[:, None] + [0, 18, 17]])
-    flat = np.column_stack([x, y, np.zeros(len(x))]), sheet if up > 0.0 else sheet[:, ::-1]
-    at, faces, same, kind = joined(ball(10.0, [0, 0, up * 7.03], 33), flat)
+    at, faces, same, kind = joined(ball(10.0, [0, 0, up * 7.03], 33), sheet(0.0, up > 0.0))
     found = Crossings(at, faces, same, kind, TWO)
     rows, depth = found.depths(found.pairs(at), 0, 1, 20.0, 0.1)
     np.testing.assert_allclose(depth, -up * at[rows, 2], atol=1e-9)
@@ -115,3 +119,15 @@ def test_what_a_ball_dips_below_a_sheet_lies_as_deep_as_its_height_says(up):
     assert 0 < len(near) < len(rows) and shallow.max() <= 1.5  # no further than so far along the ball
     kept = rows[depth > 1.0]
     np.testing.assert_array_equal(np.sort(found.depths(found.pairs(at), 0, 1, 20.0, 1.0)[0]), np.sort(kept))
+
+
+@pytest.mark.parametrize(("share", "is_counted"), [(3.9, True), (4.1, False)])
+def test_flesh_that_a_skin_passes_has_its_other_side_within_four_depths(share, is_counted):
+    """A ball dips 1 mm into a slab, whose lower side is some times the searched depth below the ball."""
+    reach, drop = 3.0, ball(2.0, [0, 0, 1.0])
+    at, faces, same, kind = joined(drop, sheet(0.0, True), sheet(-1.0 - share * reach, False))
+    found = Crossings(at, faces, same, np.zeros_like(kind), np.ones((1, 1), bool))
+    rows, depth = found.depths(found.pairs(at), 0, 0, reach, 0.1)
+    below = rows < len(drop[0])  # of the slab, some lies in the ball, too
+    assert below.any() == is_counted
+    np.testing.assert_allclose(depth[below], -at[rows[below], 2], atol=1e-9)

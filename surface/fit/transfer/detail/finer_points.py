@@ -49,35 +49,36 @@ class _Solved:
     error: Floats
 
 
-def fit_points(part: PartData, mesh: FineMesh, at: Floats, counts: Floats, jaw: Jaw) -> FittedPart:
+def fit_points(part: PartData, mesh: FineMesh, at: Floats, counts: Floats, jaw: Jaw, weight: Floats) -> FittedPart:
     """Fit a part's surface to skin ``at (n, 3)`` over a mesh, with more control points where it needs them.
 
-    counts : (n,) 0..1, how much an error matters there. jaw : the path of the jaw, for its expressions.
+    counts : (n,) 0..1, how much an error matters for where points are split. jaw : the path of the jaw, for its
+        expressions. weight : (n,) of every place in the least squares.
     """
     most = int(GROWTH * len(part.points))
-    now = _solved(part, mesh, at, counts)
+    now = _solved(part, mesh, at, counts, weight)
     for left in range(ROUNDS, 0, -1):
         chosen = too_far_apart(now.part, now.basis, now.error, now.points)
         room = most - len(now.part.points)
         chosen = chosen[: how_many(now.part, chosen, room if left == 1 else int(SHARE * room))]
         if not len(chosen):
             break
-        finer = _solved(split_points(now.part, chosen, jaw), mesh, at, counts)
+        finer = _solved(split_points(now.part, chosen, jaw), mesh, at, counts, weight)
         useful = chosen[gains(now.basis[:, chosen], now.error, finer.error) > LEAST_GAIN_MM]
         if not len(useful):
             break
         if len(useful) < len(chosen):
-            finer = _solved(split_points(now.part, useful, jaw), mesh, at, counts)
+            finer = _solved(split_points(now.part, useful, jaw), mesh, at, counts, weight)
         now = finer
     return FittedPart(now.part, now.surface, now.points, now.basis @ now.points)
 
 
-def _solved(part: PartData, mesh: FineMesh, at: Floats, counts: Floats) -> _Solved:
+def _solved(part: PartData, mesh: FineMesh, at: Floats, counts: Floats, weight: Floats) -> _Solved:
     """The part's surface fitted to skin ``at (n, 3)``."""
     surface = make_surface(part)
     basis = surface.basis_matrix(mesh.uv, side=mesh.side)
-    points = surface.points + solve_moves(surface, basis, at - basis @ surface.points)
-    return _Solved(part, surface, points, basis, counts * ((basis @ points - at) ** 2).sum(axis=1))
+    points = surface.points + solve_moves(surface, basis, at - basis @ surface.points, weight)
+    return _Solved(part, surface, points, basis, np.sqrt(weight) * counts * ((basis @ points - at) ** 2).sum(axis=1))
 
 
 def gains(shares: csr_matrix, before: Floats, after: Floats) -> Floats:
@@ -89,13 +90,13 @@ def gains(shares: csr_matrix, before: Floats, after: Floats) -> Floats:
     return gain
 
 
-def solve_moves(surface: DCPSurface, basis: csr_matrix, moves: Floats) -> Floats:
+def solve_moves(surface: DCPSurface, basis: csr_matrix, moves: Floats, weight: Floats) -> Floats:
     """(k, 3) moves of control points that move the surface by ``moves (n, 3)`` at the samples of ``basis (n, k)``.
 
     As :func:`surface.fit.points.solve.solve`, for control points that have weights.
     """
     n = surface.n
-    normal, right = normal_equations(basis, np.ones(len(moves)), moves)
+    normal, right = normal_equations(basis, weight, moves)
     fair = (identity(n) - surface.basis_matrix(centres(surface))).tocsr()
     strength = len(moves) / n
     normal += (FAIR * strength * (fair.T @ fair)).toarray()

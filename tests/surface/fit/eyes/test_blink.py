@@ -28,7 +28,7 @@ def shortened(mesh, share: float):
 def gap(mesh, openings, index: int) -> float:
     """Greatest angle between both lids of an eye in its blink, in mm along the eyeball."""
     rest = mesh.vertices - CENTRES[index]
-    return float(module._edges(rest + mesh.deltas[index], openings[index].edge, rest).gap.max()) * RADIUS
+    return float(module.lid_edges(rest + mesh.deltas[index], openings[index].edge, rest).gap.max()) * RADIUS
 
 
 def shut(mesh, openings):
@@ -103,7 +103,7 @@ def test_halves_of_a_blink_are_lengthened_together(plain, openings) -> None:
 def test_edges_are_angles_about_the_eye_over_even_places() -> None:
     a = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     rest = np.column_stack([12 * np.cos(a), 4 * np.sin(a), np.sqrt(169 - 16 * np.sin(a) ** 2 - 0 * a)])
-    found = module._edges(rest, np.arange(40), rest)
+    found = module.lid_edges(rest, np.arange(40), rest)
     np.testing.assert_allclose(found.x, np.linspace(-12, 12, 33))
     wanted = np.arctan2(
         4 * np.sqrt(np.maximum(1 - (found.x / 12) ** 2, 0)), np.sqrt(169 - 16 * np.maximum(1 - (found.x / 12) ** 2, 0))
@@ -111,7 +111,7 @@ def test_edges_are_angles_about_the_eye_over_even_places() -> None:
     np.testing.assert_allclose(found.upper, wanted, atol=0.02)
     np.testing.assert_allclose(found.lower, -wanted, atol=0.02)
     np.testing.assert_allclose(found.gap, found.upper - found.lower)
-    moved = module._edges(rest + np.array([0, 3.0, 0]), np.arange(40), rest)  # told apart at rest
+    moved = module.lid_edges(rest + np.array([0, 3.0, 0]), np.arange(40), rest)  # told apart at rest
     assert (moved.upper >= moved.lower - 1e-9).all() and moved.lower[16] < 0 < moved.lower[0]
 
 
@@ -120,8 +120,8 @@ def test_lids_turn_by_the_gap_and_an_overlap_that_fades_towards_the_corners(monk
     monkeypatch.setattr(module, "SPREAD_COLUMNS", 0.5)
     x, radius = np.linspace(-13, 13, module.COLUMNS), 12.0
     opening = np.clip(1.0 - (x / 13) ** 2, 0.0, None)
-    before = module._Edges(x, 0.5 * opening + 0.1, -0.3 * opening + 0.1)
-    after = module._Edges(x, 0.2 * opening + 0.1, -0.1 * opening + 0.1)
+    before = module.LidEdges(x, 0.5 * opening + 0.1, -0.3 * opening + 0.1)
+    after = module.LidEdges(x, 0.2 * opening + 0.1, -0.1 * opening + 0.1)
     for at in (0.0, 6.5, -12.1875):
         share = 1.0 - (at / 13) ** 2
         need = 0.3 * share + min(4.0 * share, 1.0) / radius
@@ -162,7 +162,7 @@ def test_skin_that_the_blink_leaves_alone_stays_when_it_is_lengthened(plain, ope
 def test_lids_are_told_apart_by_a_line_between_corners_that_need_not_be_level() -> None:
     a = np.linspace(0, 2 * np.pi, 40, endpoint=False)
     slanted = np.column_stack([12 * np.cos(a), 3 * np.sin(a) + 2.5 * np.cos(a), 12 + 0 * a])
-    found = module._edges(slanted, np.arange(40), slanted)
+    found = module.lid_edges(slanted, np.arange(40), slanted)
     lift = np.sqrt(np.maximum(1 - (found.x / 12) ** 2, 0))
     np.testing.assert_allclose(found.upper, np.arctan2(3 * lift + 2.5 * found.x / 12, 12), atol=0.02)
     np.testing.assert_allclose(found.lower, np.arctan2(-3 * lift + 2.5 * found.x / 12, 12), atol=0.02)

@@ -44,6 +44,31 @@ def test_steps_go_to_each_point_from_the_mean_of_its_neighbours() -> None:
     np.testing.assert_allclose(module._steps(tri, n).toarray(), step, atol=1e-12)
 
 
+def test_a_border_that_is_pulled_takes_the_skin_beside_it_along_and_counts_more_in_the_fit(monkeypatch) -> None:
+    made = Skin(grid(33), RIM, lambda p: p, FAR)
+    before, border = made.at.copy(), np.flatnonzero(made.mesh.uv[:, 0] == 0.0)
+    made.pull(border, before[border] + [0.0, 0.0, 1.0])
+    moved = made.at - before
+    np.testing.assert_allclose(moved[:, :2], 0.0, atol=1e-9)
+    np.testing.assert_allclose(moved[border, 2], 1.0, atol=1e-3)
+    rows = moved[:, 2].reshape(33, 33).mean(axis=1)
+    assert (np.diff(rows[:8]) < 0.0).all() and rows[2] > 0.8 and abs(rows[-1]) < 0.1
+    seen = []
+    monkeypatch.setattr(module, "fit_points", lambda *given: seen.append(given[-1]) or SimpleNamespace(
+        surface=None, points=None, at=None, part=None))  # fmt: skip
+    made.solve(None, JAW)
+    weight = seen[0].reshape(33, 33)
+    np.testing.assert_allclose(weight[[0, -1]], [[20.0] * 33, [1.0] * 33], rtol=1e-6)
+    assert (np.diff(weight, axis=0) <= 0.0).all()
+
+
+def test_without_seams_nothing_is_pulled() -> None:
+    made = Skin(grid(), RIM, lambda p: p, FAR)
+    before = made.at.copy()
+    made.pull(np.zeros(0, int), np.zeros((0, 3)))
+    np.testing.assert_array_equal(made.at, before)
+
+
 def test_normals_are_those_of_the_surface() -> None:
     part = grid(33)
     made = Skin(part, RIM, lambda p: p, FAR)
