@@ -139,12 +139,17 @@ def _skin(
         points = int(np.clip(POINTS * share, max(REST, LEAST * len(rest)), POINTS))
         out.append(_part("back", "skin", points, 0.1, 0.4, scale, rest, mesh))
     if inner:
-        points, coarse, error = cavity.POINTS, cavity.COARSE, cavity.ERROR_MM
-        made, own = _part(cavity.NAME, cavity.MATERIAL, points + cavity.SPARE, coarse, error, scale, inner, mesh)
-        request = replace(made.request, spare=cavity.SPARE, dense=True)
-        budget = made.budget[0], cavity.CHORD_MM * scale, made.budget[2]
-        out.append((replace(made, request=request, budget=budget), own))
+        out.append(_lining(cavity.NAME, scale, inner, mesh))
     return out
+
+
+def _lining(name: str, scale: float, islands: list[Island], mesh: FitMesh) -> tuple[PartRecipe, list[Island]]:
+    """A part that lines the mouth, whether it is of the skin's piece or one of its own."""
+    points, coarse, error = cavity.POINTS, cavity.COARSE, cavity.ERROR_MM
+    made, own = _part(name, cavity.MATERIAL, points + cavity.SPARE, coarse, error, scale, islands, mesh)
+    request = replace(made.request, spare=cavity.SPARE, dense=True)
+    budget = made.budget[0], cavity.CHORD_MM * scale, made.budget[2]
+    return replace(made, request=request, budget=budget), own
 
 
 def _part(
@@ -181,7 +186,10 @@ def _others(
         share = sum(_area(mesh, i) for i in islands) / max(skin_area, 1e-9)
         points = int(np.clip(1.5 * POINTS * share, min(3 * LEAST * len(islands), POINTS), POINTS))
         title = f"{kind.material if kind.material != 'skin' else 'piece'}_{len(out) + 1}"
-        out.append(_part(title, kind.material, points, 0.34, 0.5, scale, islands, mesh))
+        if kind.material == cavity.MATERIAL:
+            out.append(_lining(title, scale, islands, mesh))
+        else:
+            out.append(_part(title, kind.material, points, 0.34, 0.5, scale, islands, mesh))
         notes.append(f"{name!r}: {kind.name}: {len(islands)} islands as {title}")
     return out
 
