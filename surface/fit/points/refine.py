@@ -25,9 +25,9 @@ from surface.fit.source.mesh import FitMesh
 HOLD_WEIGHTS = (1.0, 30.0, 1e3, 3e4)  # how strongly points around outliers are held, one round after another
 FAR_FACTOR = 1.5  # of the error that is mended: control points beyond it are clamped to the mesh's own range
 MAX_RMS_FACTOR = 1.25  # of the RMS of the first fit: the price elsewhere that mending a spike may have
-ROOMS = (3.2, 2.3, 1.6, 1.0)  # errors that a calmer surface may have anywhere, in those that count as 1, tried in turn
+ROOMS = (3.2, 2.3, 1.6, 1.0, 0.7)  # errors that a calmer surface may have, in those that count as 1, tried in turn
 BOUNDS = (1.0, 3.2, 0.32)  # of RMS, of 99 in 100 samples and of shapes' RMS, relative to that of the RMS
-KEPT = 0.98  # of the bounds: what a calmer surface may reach
+KEPT = 0.995  # of the bounds: what a calmer surface may reach
 CALM_ROUNDS = 4  # of finding out where the surface may be calm
 MAX_LOSS = 1.05  # factor by which errors that are larger than wanted may grow for that
 MIN_PROGRESS = 0.9  # of the number of outliers, or of the largest error: a round that leaves more is the last

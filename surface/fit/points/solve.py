@@ -98,14 +98,12 @@ def solve(
             normal += more
             right += more_right
             if np.any(bend):
+                corners = where.corners.shape[1]
+                turn = np.zeros((corners * len(where.weight), right.shape[1])) if turns is None else turns[axis]
                 for k, rows in enumerate(bending(net, where, axis, slope)):
-                    still = (
-                        np.zeros((len(where.weight), 0)) if turns is None else turns[axis][k :: where.corners.shape[1]]
-                    )
-                    more, more_right = normal_equations(rows, bend * where.weight, still)
+                    more, more_right = normal_equations(rows, bend * where.weight, turn[k::corners])
                     normal += more
-                    if turns is not None:
-                        right += more_right
+                    right += more_right
     strength = weight.sum() / n
     f = fairness(net)
     normal += (strength * (f.T @ diags(np.broadcast_to(fair, n)) @ f)).toarray()

@@ -263,3 +263,19 @@ def test_errors_that_have_bounds_are_those_outside_folds(fitted):
     still = replace(fit, shape_error=fit.shape_error[:0])
     assert refine.bounded_errors(own, still)[2] == 0.0
     assert not refine.bounded_errors(replace(own, folded=own.folded | True), fit).any()
+
+
+def test_where_a_calm_surface_would_leave_the_mesh_it_follows_that_as_before():
+    """A peak of 3 mm on one vertex: calm everywhere the fit cuts it off, so the faces there are followed."""
+    mesh = dome()
+    mesh.vertices[112, 2] += 3.0
+    chart = make_chart(mesh, find_islands(mesh), downweight_slivers=True)
+    plain = fit_chart(mesh, chart, DOME)
+    calm = refine.Calm(mesh, chart, plain.net, np.full(len(plain.net), DOME.fair), DOME.bend)
+    room = float(refine.need(chart, plain, DOME).max()) + 0.01  # at first nothing is strict
+    everywhere, within = (refine._calmed_within(r, calm, plain, DOME) for r in (1e9, room))
+    cut, kept = (refine.need(chart, f, DOME) for f in (everywhere, within))
+    assert cut.max() > 1.5 * room and kept.max() < 1.1 * room
+    far = (np.abs(chart.uv - 0.5).max(axis=1) < 0.35) & (np.linalg.norm(chart.uv - chart.uv[112], axis=1) > 0.25)
+    assert far.sum() > 50
+    np.testing.assert_allclose(within.error[far], everywhere.error[far], atol=0.05)
