@@ -54,7 +54,8 @@ class SlopeTargets:
     def _used(self) -> Floats:
         """(4 f, 1) 1 for corners, 0 for the fourth of a triangle."""
         apart = np.abs(self.slopes.corners - self.slopes.uv[:, None]).max(axis=2) > 0.0
-        return apart.reshape(-1, 1).astype(np.float64)
+        used: Floats = apart.reshape(-1, 1).astype(np.float64)
+        return used
 
     def _mean(self, turn: Floats) -> Floats:
         """(f, c) mean over the corners of each face."""
@@ -99,7 +100,8 @@ def samples_of(mesh: FitMesh, mix: csr_matrix) -> Floats:
 
 def calm_faces(chart: Chart, slopes: Slopes, strict: Bools) -> Bools:
     """(f,) faces none of whose vertices belong to a sample that is ``strict (m,)``."""
-    return np.asarray(_pattern(slopes.mix_u) @ _vertices(chart, strict)).ravel() == 0
+    calm: Bools = np.asarray(_pattern(slopes.mix_u) @ _vertices(chart, strict)).ravel() == 0
+    return calm
 
 
 def calm_points(rows: csr_matrix, strict: Bools) -> Bools:
@@ -112,7 +114,8 @@ def calm_points(rows: csr_matrix, strict: Bools) -> Bools:
 
 def beside(chart: Chart, samples: Bools) -> Bools:
     """(m,) samples that share a vertex of the mesh with any of ``samples (m,)``, themselves included."""
-    return np.asarray(_pattern(chart.mix) @ _vertices(chart, samples)).ravel() > 0
+    near: Bools = np.asarray(_pattern(chart.mix) @ _vertices(chart, samples)).ravel() > 0
+    return near
 
 
 def _vertices(chart: Chart, samples: Bools) -> Floats:
