@@ -235,6 +235,8 @@ def _fit_parts(
         if not parts and plan.found and plan.found.openings:
             chart = with_importance(chart, mesh, *plan.eyes)
             request = replace(request, points=request.points + len(plan.eyes[0]) * MORE_POINTS)
+        if not parts:  # the plan's scale is that of the mesh before its lids were fitted, the bounds' that of the head
+            request = replace(request, calm_mm=min(request.calm_mm, RMS_MM * scale))
         fitted = fit_chart(mesh if part.follows == "skin" else still, chart, request, partial(step, part.name))
         fine = facet_sag(mesh, chart) <= RMS_MM * scale
         report = measure(part.name, chart, fitted, mesh.names, fine)

@@ -26,12 +26,14 @@ from surface.fit.source.layout import lay_out, open_flat_holes, straighten_holes
 from surface.fit.source.mesh import FitMesh, components, face_areas, triangles
 from surface.fit.source.owncharts import usable_islands
 from surface.fit.source.placing.frame import head_scale
+from surface.fit.source.smooth_map import smooth_map
 from surface.mesh.tessellate import MAX_ROOTS
 
 POINTS, REST = 2450, 560  # control points of the face and of a part of the same size that hardly moves
 FACE_MM2 = 1.3e5  # of a head of usual size: an island of more holds the back of the head, too
 FINEST = 0.3  # in spacings of the mesh: the largest around a place count, and a coarse mesh has corners and creases
 BEND = 0.12  # weight of what bends within faces of the mesh: shading shows waves that distances do not
+CALM_MM = 0.25  # RMS of skin, of a head of usual size, up to which it is made calmer than the mesh's faces
 ASTRAY_MM = 1.8  # of a head of usual size: where the surface is further off, it is mended
 SPARE = 60  # points of the face that are kept for mending
 GROWTH = 1.12  # of the face's net between two solves: small, for its points are few
@@ -137,12 +139,17 @@ def _skin(
         points = int(np.clip(POINTS * share, max(REST, LEAST * len(rest)), POINTS))
         out.append(_part("back", "skin", points, 0.1, 0.4, scale, rest, mesh))
     if inner:
-        points, coarse, error = cavity.POINTS, cavity.COARSE, cavity.ERROR_MM
-        made, own = _part(cavity.NAME, cavity.MATERIAL, points + cavity.SPARE, coarse, error, scale, inner, mesh)
-        request = replace(made.request, spare=cavity.SPARE, dense=True)
-        budget = made.budget[0], cavity.CHORD_MM * scale, made.budget[2]
-        out.append((replace(made, request=request, budget=budget), own))
+        out.append(_lining(cavity.NAME, scale, inner, mesh))
     return out
+
+
+def _lining(name: str, scale: float, islands: list[Island], mesh: FitMesh) -> tuple[PartRecipe, list[Island]]:
+    """A part that lines the mouth, whether it is of the skin's piece or one of its own."""
+    points, coarse, error = cavity.POINTS, cavity.COARSE, cavity.ERROR_MM
+    made, own = _part(name, cavity.MATERIAL, points + cavity.SPARE, coarse, error, scale, islands, mesh)
+    request = replace(made.request, spare=cavity.SPARE, dense=True)
+    budget = made.budget[0], cavity.CHORD_MM * scale, made.budget[2]
+    return replace(made, request=request, budget=budget), own
 
 
 def _part(
@@ -152,13 +159,14 @@ def _part(
     face = name == "face"
     request = FitRequest(
         points, coarse=coarse, neutral_mm=error * scale, shape_mm=0.45 * scale,
-        finest=FINEST, bend=BEND, growth=GROWTH if face else 1.25,
+        finest=FINEST, bend=BEND, calm_mm=CALM_MM * scale if material == "skin" else 0.0,
+        growth=GROWTH if face else 1.25,
         astray_mm=ASTRAY_MM * scale, spare=SPARE if face else 0,
     )  # fmt: skip
     depth = DEPTH + int(np.ceil(np.log2(max(1.0, TILE * len(islands) / MAX_ROOTS))))
     budget = 0, 0.24 * scale if face else 0.5 * scale, depth
     recipe = PartRecipe(name, material, "skin", [], request, budget, downweight_slivers=True)
-    return recipe, [open_flat_holes(straighten_holes(i)) for i in lay_out(mesh, islands)]
+    return recipe, [smooth_map(mesh, open_flat_holes(straighten_holes(i))) for i in lay_out(mesh, islands)]
 
 
 def _others(
@@ -178,7 +186,10 @@ def _others(
         share = sum(_area(mesh, i) for i in islands) / max(skin_area, 1e-9)
         points = int(np.clip(1.5 * POINTS * share, min(3 * LEAST * len(islands), POINTS), POINTS))
         title = f"{kind.material if kind.material != 'skin' else 'piece'}_{len(out) + 1}"
-        out.append(_part(title, kind.material, points, 0.34, 0.5, scale, islands, mesh))
+        if kind.material == cavity.MATERIAL:
+            out.append(_lining(title, scale, islands, mesh))
+        else:
+            out.append(_part(title, kind.material, points, 0.34, 0.5, scale, islands, mesh))
         notes.append(f"{name!r}: {kind.name}: {len(islands)} islands as {title}")
     return out
 

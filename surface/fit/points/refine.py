@@ -15,6 +15,7 @@ import numpy as np
 from scipy.sparse import csr_matrix, vstack
 
 from surface.base.arrays import Bools, Floats
+from surface.fit.points.calm import Calm, beside, samples_of
 from surface.fit.points.dense import around, bounded, dense_errors, places_of
 from surface.fit.points.net import Net, coarse_places, keys, level_caps, net_at, wanted_places
 from surface.fit.points.solve import basis, solve
@@ -24,6 +25,11 @@ from surface.fit.source.mesh import FitMesh
 HOLD_WEIGHTS = (1.0, 30.0, 1e3, 3e4)  # how strongly points around outliers are held, one round after another
 FAR_FACTOR = 1.5  # of the error that is mended: control points beyond it are clamped to the mesh's own range
 MAX_RMS_FACTOR = 1.25  # of the RMS of the first fit: the price elsewhere that mending a spike may have
+ROOMS = (3.2, 2.3, 1.6, 1.0, 0.7)  # errors that a calmer surface may have, in those that count as 1, tried in turn
+BOUNDS = (1.0, 3.2, 0.32)  # of RMS, of 99 in 100 samples and of shapes' RMS, relative to that of the RMS
+KEPT = 0.995  # of the bounds: what a calmer surface may reach
+CALM_ROUNDS = 4  # of finding out where the surface may be calm
+MAX_LOSS = 1.05  # factor by which errors that are larger than wanted may grow for that
 MIN_PROGRESS = 0.9  # of the number of outliers, or of the largest error: a round that leaves more is the last
 
 
@@ -34,6 +40,8 @@ class FitRequest:
     points : most control points; coarse : spacing of the first net, in tiles; deepest : its finest level.
     neutral_mm, shape_mm : errors of neutral and shapes that count as 1; fair : weight of fairness.
     bend : weight of bending within faces of the mesh, where it says nothing of the form, relative to that of slopes.
+    calm_mm : RMS of neutral up to which the surface is made calmer than the mesh's faces, see
+        :mod:`surface.fit.points.calm`; 0 : it is not.
     growth : most factor by which the net grows between two solves.
     finest : least spacing of a net, in spacings of the mesh's vertices.
     astray_mm : where the surface is further off, also between samples, it is mended; spare : points kept for that.
@@ -48,6 +56,7 @@ class FitRequest:
     shape_mm: float = 0.3
     fair: float = 1e-4
     bend: float = 0.0
+    calm_mm: float = 0.0
     growth: float = 1.25
     finest: float = 1.2
     astray_mm: float = 2.5
@@ -102,9 +111,9 @@ def _refined(
     mesh: FitMesh, chart: Chart, net: Net, request: FitRequest, hold: Hold, report: Callable[[float], None]
 ) -> Fitted:  # fmt: skip
     """Solve, and add points where samples are off, until none is or there are enough points."""
-    targets, slopes = _targets(mesh, chart.mix), None
+    targets, slopes = samples_of(mesh, chart.mix), None
     if chart.slopes is not None:
-        slopes = chart.slopes, _targets(mesh, chart.slopes.mix_u), _targets(mesh, chart.slopes.mix_v)
+        slopes = chart.slopes, samples_of(mesh, chart.slopes.mix_u), samples_of(mesh, chart.slopes.mix_v)
     while True:
         b = basis(net, chart.uv)
         solved = solve(net, b, chart.weight, targets, hold.fair(net, request.fair), slopes, request.bend)
@@ -112,10 +121,52 @@ def _refined(
         report(min(1.0, len(net) / request.points))
         room = request.points - len(net)
         if room <= 0:
-            return fitted
+            break
         net, grown = _grow(net, chart, need(chart, fitted, request), request, room)
         if not grown:
-            return fitted
+            break
+    return _calmed(mesh, chart, fitted, request, hold) if request.calm_mm > 0.0 else fitted
+
+
+def _calmed(mesh: FitMesh, chart: Chart, fitted: Fitted, request: FitRequest, hold: Hold) -> Fitted:
+    """The fit with the same net, as calm as the bounds of its errors allow; as it was where they allow nothing."""
+    if chart.slopes is None:
+        return fitted
+    calm = Calm(mesh, chart, fitted.net, hold.fair(fitted.net, request.fair), request.bend)
+    most = np.maximum(KEPT * request.calm_mm * np.array(BOUNDS), bounded_errors(chart, fitted))
+    for room in ROOMS:
+        trial = _calmed_within(room, calm, fitted, request)
+        if (bounded_errors(chart, trial) <= most).all():
+            return trial
+    return fitted
+
+
+def _calmed_within(room: float, calm: Calm, fitted: Fitted, request: FitRequest) -> Fitted:
+    """The fit, calm wherever no error grows above ``room``, in errors that count as 1, or much above what it was.
+
+    Where one does, and around there if that is not enough, the surface follows the mesh's faces as before.
+    """
+    chart, net = calm.chart, calm.net
+    plain, targets, rows = replace(chart, importance=None), samples_of(calm.mesh, chart.mix), basis(net, chart.uv)
+    before = need(plain, fitted, request)
+    strict = before > room
+    for _ in range(CALM_ROUNDS):
+        trial = _measured(net, rows, targets, calm.solved(rows, targets, strict))
+        worse = need(plain, trial, request) > np.maximum(room, MAX_LOSS * before)
+        if not worse.any():
+            break
+        strict = strict | (worse if (worse & ~strict).any() else beside(chart, worse))
+    return trial
+
+
+def bounded_errors(chart: Chart, fitted: Fitted) -> Floats:
+    """(3,) mm, what has bounds: RMS and 99th percentile of neutral and the mean of shapes' RMS, outside folds."""
+    counted = ~chart.folded
+    if not counted.any():
+        return np.zeros(len(BOUNDS))
+    off, shapes = fitted.error[counted], fitted.shape_error[:, counted]
+    mean = np.sqrt((shapes**2).mean(axis=1)).mean() if len(shapes) else 0.0
+    return np.array([np.sqrt((off**2).mean()), np.percentile(off, 99), mean])
 
 
 def _mended(
@@ -175,7 +226,7 @@ def _strays(mesh: FitMesh, chart: Chart, fitted: Fitted, most_mm: float) -> Bool
 def _on(mesh: FitMesh, chart: Chart, fitted: Fitted) -> Fitted:
     """The same control points, with the errors that they have at the chart's own samples."""
     x = np.concatenate([fitted.points[:, None], fitted.moves.transpose(1, 0, 2)], axis=1).reshape(len(fitted.net), -1)
-    return _measured(fitted.net, basis(fitted.net, chart.uv), _targets(mesh, chart.mix), x)
+    return _measured(fitted.net, basis(fitted.net, chart.uv), samples_of(mesh, chart.mix), x)
 
 
 def _with_samples(chart: Chart, places: Places) -> Chart:
@@ -188,11 +239,6 @@ def _with_samples(chart: Chart, places: Places) -> Chart:
     if chart.importance is not None:
         joined["importance"] = np.concatenate([chart.importance, np.ones(len(places.uv))])
     return replace(chart, mix=vstack([chart.mix, places.mix]).tocsr(), **joined)
-
-
-def _targets(mesh: FitMesh, mix: csr_matrix) -> Floats:
-    """(m, 3 (1 + k)): neutral and shape displacements at rows of ``mix``."""
-    return np.hstack([mix @ mesh.vertices, *(mix @ d for d in mesh.deltas)])
 
 
 def _measured(net: Net, b: csr_matrix, targets: Floats, x: Floats) -> Fitted:

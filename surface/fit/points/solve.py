@@ -35,7 +35,7 @@ def fairness(net: Net) -> csr_matrix:
 
 
 def bending(net: Net, slopes: Slopes, axis: int, centre: csr_matrix) -> Iterator[csr_matrix]:
-    """Rows (f, n) that vanish where the surface does not bend within the faces of a mesh, one for each corner.
+    """Rows (f, n) that vanish where the surface does not bend within the faces of a mesh, for one corner after another.
 
     What stands closer than the mesh's vertices may wave between them, for positions and slopes say nothing there. These
     rows are the differences of the slope along ``axis`` half-way to a corner and that in the face's ``centre (f, n)``.
@@ -77,13 +77,16 @@ def normal_equations(rows: csr_matrix, weight: Floats, targets: Floats) -> tuple
 
 def solve(
     net: Net, samples: csr_matrix, weight: Floats, targets: Floats, fair: float | Floats,
-    slopes: tuple[Slopes, Floats, Floats] | None = None, bend: float = 0.0,
+    slopes: tuple[Slopes, Floats, Floats] | None = None, bend: float | Floats = 0.0,
+    turns: tuple[Floats, Floats] | None = None,
 ) -> Floats:  # fmt: skip
     """Control point coordinates (n, c) for all targets (m, c) at once.
 
     Minimises sum weight (B P - target)^2 + slopes + fair (m / n) |F P|^2 with F of :func:`fairness`; one
     factorisation serves every right-hand side. ``slopes`` come with their targets (f, c) in u and in v. ``fair`` is one
-    number, or one of each control point (n,). ``bend`` : weight of :func:`bending` relative to that of slopes.
+    number, or one of each control point (n,). ``bend`` : weight of :func:`bending` relative to that of slopes, one
+    number or one of each face (f,). ``turns`` : what those rows should be in u and in v, (4 f, c), corner after corner
+    of each face; without them 0, a surface that does not bend there.
     """
     n = len(net)
     normal, right = normal_equations(samples, weight, targets)
@@ -94,10 +97,13 @@ def solve(
             more, more_right = normal_equations(slope, where.weight, wanted[axis])
             normal += more
             right += more_right
-            if bend > 0.0:
-                still = np.zeros((len(where.weight), 0))
-                for rows in bending(net, where, axis, slope):
-                    normal += normal_equations(rows, bend * where.weight, still)[0]
+            if np.any(bend):
+                corners = where.corners.shape[1]
+                turn = np.zeros((corners * len(where.weight), right.shape[1])) if turns is None else turns[axis]
+                for k, rows in enumerate(bending(net, where, axis, slope)):
+                    more, more_right = normal_equations(rows, bend * where.weight, turn[k::corners])
+                    normal += more
+                    right += more_right
     strength = weight.sum() / n
     f = fairness(net)
     normal += (strength * (f.T @ diags(np.broadcast_to(fair, n)) @ f)).toarray()

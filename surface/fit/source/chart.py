@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix, identity, vstack
+from scipy.sparse import csr_matrix, diags, identity, vstack
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.source.bends import slope_trust
@@ -233,6 +233,8 @@ class Slopes:
     uv : (f, 2) face centres; span : (f, 2) a face's extent in u and in v.
     mix_u, mix_v : (f, n) sparse; times the mesh's n vertices: what a surface's S_u, S_v times span should be.
     weight : (f,) in least squares. corners : (f, 4, 2) of the faces in (u, v); the centre where there is no fourth.
+    turn_u, turn_v : (4 f, n) sparse, a row for each corner: how the slope of a surface that is smooth across the mesh's
+        edges turns from the face to there: the mean of the faces around less the face's own; 0 for a fourth of three.
     """
 
     uv: Floats
@@ -241,6 +243,8 @@ class Slopes:
     mix_v: csr_matrix
     weight: Floats
     corners: Floats = field(default_factory=lambda: np.zeros((0, 4, 2)))
+    turn_u: csr_matrix = field(default_factory=lambda: csr_matrix((0, 0)))
+    turn_v: csr_matrix = field(default_factory=lambda: csr_matrix((0, 0)))
 
 
 def face_slopes(island: Island, vertices: int, weight: Floats, *, downweight_slivers: bool = False) -> Slopes:
@@ -264,12 +268,31 @@ def face_slopes(island: Island, vertices: int, weight: Floats, *, downweight_sli
     decided = np.linalg.det(moments)  # above 0 also without extent in u or v, where full weight does no harm
     trust = decided / np.maximum((span**2).prod(axis=1), decided) if downweight_slivers else np.ones(len(corner))
     weight = trust * np.where(used, weight[corner], np.inf).min(axis=1)
-    return Slopes(centre, span, mix_u, mix_v, weight, centre[:, None] + offset)
+    area = face_areas(np.pad(island.uv, ((0, 0), (0, 1))), island.faces)
+    turn = _to_corners(island.faces, np.maximum(weight * area, 1e-9 * float((weight * area).max(initial=1e-9))))
+    slope = (csr_matrix((gradient[..., i].ravel(), place), shape=shape) for i in (0, 1))
+    turn_u, turn_v = ((diags(np.repeat(span[:, i], 4)) @ turn @ s).tocsr() for i, s in enumerate(slope))
+    return Slopes(centre, span, mix_u, mix_v, weight, centre[:, None] + offset, turn_u, turn_v)
+
+
+def _to_corners(faces: Ints, share: Floats) -> csr_matrix:
+    """(4 f, f): from what faces (f, 4) have to what is at their corners, the mean of the faces around weighted by
+    ``share (f,)``, less what the face has itself."""
+    used, face = (faces >= 0).ravel(), np.repeat(np.arange(len(faces)), 4)
+    point, row = faces.ravel()[used], np.flatnonzero(used)
+    around = csr_matrix((share[face[used]], (point, face[used])), shape=(int(faces.max(initial=-1)) + 1, len(faces)))
+    mean = diags(1.0 / np.maximum(np.asarray(around.sum(axis=1)).ravel(), 1e-300)) @ around
+    corner, own = (
+        csr_matrix((np.ones(len(row)), (row, of)), shape=(len(used), most))
+        for of, most in ((point, mean.shape[0]), (face[used], len(faces)))
+    )
+    return (corner @ mean - own).tocsr()
 
 
 def join_slopes(parts: list[Slopes]) -> Slopes:
     """The slopes of several islands as one."""
-    mix_u, mix_v = (vstack([getattr(p, k) for p in parts]).tocsr() for k in ("mix_u", "mix_v"))
+    sparse = ("mix_u", "mix_v", "turn_u", "turn_v")
+    mix_u, mix_v, turn_u, turn_v = (vstack([getattr(p, k) for p in parts]).tocsr() for k in sparse)
     keys = ("uv", "span", "weight", "corners")
     uv, span, weight, corner = (np.concatenate([getattr(p, k) for p in parts]) for k in keys)
-    return Slopes(uv, span, mix_u, mix_v, weight, corner)
+    return Slopes(uv, span, mix_u, mix_v, weight, corner, turn_u, turn_v)

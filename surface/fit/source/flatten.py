@@ -83,7 +83,7 @@ def _on_circle(points: Floats, tri: Ints, rim: Ints) -> Floats | None:
     inner = np.setdiff1d(np.arange(n), rim)
     if not len(inner):
         return out
-    weights = _mean_value(points, tri)[inner]
+    weights = mean_value(points, tri)[inner]
     system = (identity(len(inner)) - weights[:, inner]).tocsc()
     try:
         out[inner] = splu(system).solve(np.ascontiguousarray(weights[:, rim] @ out[rim]))
@@ -92,8 +92,9 @@ def _on_circle(points: Floats, tri: Ints, rim: Ints) -> Floats | None:
     return out
 
 
-def _mean_value(points: Floats, tri: Ints) -> csr_matrix:
-    """(n, n) rows of positive weights that sum up to 1: a point in terms of its neighbours."""
+def mean_value(points: Floats, tri: Ints) -> csr_matrix:
+    """(n, n) rows of positive weights that sum up to 1: each of points (n, 3) in terms of those that share triangles
+    (t, 3) with it; mean value coordinates (Floater 2003)."""
     rows, columns, values = [], [], []
     for k in range(3):
         at, one, two = tri[:, k], tri[:, (k + 1) % 3], tri[:, (k + 2) % 3]

@@ -10,7 +10,7 @@ from slit_sheet import SIZE_MM, slit_sheet
 
 from surface.dcp import DCPSurface
 from surface.fit.eyes.search import middle_x
-from surface.fit.features import generic
+from surface.fit.features import cavity, generic
 from surface.fit.features.generic import MOST_ISLANDS, POINTS, make_plan
 from surface.fit.measures.closest import ClosestTree
 from surface.fit.source.islands import Island, boundary_loops, signed_areas
@@ -234,6 +234,23 @@ def test_the_area_of_an_island_is_that_of_its_faces() -> None:
     turned = squares((3, 4, 2, 5))
     turned = replace(turned, vertices=turned.vertices @ np.linalg.qr(np.arange(9.0).reshape(3, 3) ** 2 + np.eye(3))[0])
     assert generic._area(turned, islands_of(turned, np.ones(1, bool))[0]) == pytest.approx(4.0)
+
+
+def test_what_lines_the_mouth_is_fitted_alike_as_a_piece_of_its_own() -> None:
+    """As closely as what lines it within the skin, also between the mesh's vertices."""
+    mesh = squares((0.0, 0, 100.0, 0), (300.0, 0, 100.0, 0), names=("Mouth Bag", "Tongue"))
+    (own, _), (tongue, _) = generic._others(mesh, np.arange(2), [0, 1], 40_000.0, 2.0, [])
+    assert (own.name, own.material, tongue.material) == ("mouth_1", cavity.MATERIAL, "tongue")
+    assert own.request.points == cavity.POINTS + cavity.SPARE and own.request.spare == cavity.SPARE
+    assert own.request.dense and not tongue.request.dense
+    assert own.request.neutral_mm == 2.0 * cavity.ERROR_MM and own.request.coarse == cavity.COARSE
+    assert own.budget[1] == 2.0 * cavity.CHORD_MM < tongue.budget[1]
+
+
+def test_only_skin_is_calmer_than_its_mesh() -> None:
+    mesh = squares(*((300.0 * k, 0, 100.0, 0) for k in range(3)), names=("Tongue", "Box", "Mouth"))
+    parts = generic._others(mesh, np.arange(3), [0, 1, 2], 40_000.0, 2.0, [])
+    assert [p.request.calm_mm for p, _ in parts] == [0.0, 2.0 * generic.CALM_MM, 0.0]
 
 
 def test_others_get_points_by_their_share_of_the_skin() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from slit_sheet import ROW, N, slit_sheet
 
+from surface.dcp import DCPSurface
 from surface.fit.points import refine
 from surface.fit.points.dense import dense_errors
 from surface.fit.points.net import coarse_places, net_at
@@ -199,3 +200,82 @@ def test_control_points_have_the_errors_that_were_measured(fitted):
     np.testing.assert_allclose(again.error, fit.error, atol=1e-9)
     np.testing.assert_allclose(again.shape_error, fit.shape_error, atol=1e-9)
     np.testing.assert_array_equal(again.moves, fit.moves)
+
+
+def dome() -> FitMesh:
+    """A cap of a ball of 80 mm from above, whose 15 by 15 vertices stand irregularly, cut into triangles at random."""
+    rng = np.random.default_rng(7)
+    s = np.linspace(-50.0, 50.0, 15)
+    x, y = (a.ravel() for a in np.meshgrid(s, s))
+    free = (np.abs(x) < 49) & (np.abs(y) < 49)
+    x, y = (a + free * rng.uniform(-2.0, 2.0, a.size) for a in (x, y))
+    at = np.column_stack([x, y, np.sqrt(80.0**2 - x**2 - y**2)])
+    rows = np.arange(225).reshape(15, 15)
+    a, b, c, d = (g.ravel() for g in (rows[:-1, :-1], rows[:-1, 1:], rows[1:, 1:], rows[1:, :-1]))
+    other, none = rng.random(len(a)) < 0.5, np.full(len(a), -1)
+    one = np.where(other[:, None], np.column_stack([a, b, d]), np.column_stack([a, b, c]))
+    two = np.where(other[:, None], np.column_stack([b, c, d]), np.column_stack([a, c, d]))
+    faces = np.column_stack([np.vstack([one, two]), np.concatenate([none, none])])
+    return FitMesh(at, faces, at[:, :2] / 100.0 + 0.5, faces.copy(), (), np.zeros((0, 225, 3)))
+
+
+DOME = FitRequest(900, coarse=0.04, finest=0.3, neutral_mm=0.25, bend=0.12)
+
+
+def tilts(mesh: FitMesh, fit: Fitted) -> np.ndarray:
+    """Angles (degrees) between normals of a fit and of the ball."""
+    surface = DCPSurface(fit.points, np.ones(len(fit.net)), fit.net.knots_u, fit.net.knots_v)
+    at, su, sv = surface.derivatives(np.random.default_rng(1).uniform(0.15, 0.85, (800, 2)))
+    normal = np.cross(su, sv)
+    along = (normal * at).sum(axis=1) / (np.linalg.norm(normal, axis=1) * np.linalg.norm(at, axis=1))
+    return np.degrees(np.arccos(np.clip(along, -1.0, 1.0)))
+
+
+def test_a_calm_fit_has_the_normals_of_the_smooth_surface_that_the_mesh_stands_for():
+    mesh = dome()
+    chart = make_chart(mesh, find_islands(mesh), downweight_slivers=True)
+    plain, calm = (fit_chart(mesh, chart, replace(DOME, calm_mm=mm)) for mm in (0.0, 0.25))
+    assert rms(tilts(mesh, calm)) < 0.7 * rms(tilts(mesh, plain))
+    assert (refine.bounded_errors(chart, calm) <= 0.25 * np.array(refine.BOUNDS)).all()
+    np.testing.assert_array_equal(calm.net.place, plain.net.place)
+
+
+def test_a_fit_is_calm_only_as_far_as_its_bounds_allow():
+    """Of a fit that is at its bounds already, or beyond them, nothing gets worse."""
+    mesh = dome()
+    chart = make_chart(mesh, find_islands(mesh), downweight_slivers=True)
+    plain = fit_chart(mesh, chart, DOME)
+    before = refine.bounded_errors(chart, plain)
+    for bound in (2.0, 1.02, 0.5):
+        most = np.maximum(bound * before[0] * np.array(refine.BOUNDS), before)
+        calm = fit_chart(mesh, chart, replace(DOME, calm_mm=bound * before[0]))
+        assert (refine.bounded_errors(chart, calm) <= most).all()
+        assert (np.abs(calm.points - plain.points).max() > 0.01) == (bound == 2.0)
+
+
+def test_errors_that_have_bounds_are_those_outside_folds(fitted):
+    _, chart, fit = fitted
+    own = replace(chart, folded=np.arange(len(fit.error)) % 3 == 0)
+    error, shapes = fit.error[~own.folded], fit.shape_error[:, ~own.folded]
+    found = refine.bounded_errors(own, fit)
+    wanted = [rms(error), np.percentile(error, 99), np.mean([rms(s) for s in shapes])]
+    np.testing.assert_allclose(found, wanted)
+    still = replace(fit, shape_error=fit.shape_error[:0])
+    assert refine.bounded_errors(own, still)[2] == 0.0
+    assert not refine.bounded_errors(replace(own, folded=own.folded | True), fit).any()
+
+
+def test_where_a_calm_surface_would_leave_the_mesh_it_follows_that_as_before():
+    """A peak of 3 mm on one vertex: calm everywhere the fit cuts it off, so the faces there are followed."""
+    mesh = dome()
+    mesh.vertices[112, 2] += 3.0
+    chart = make_chart(mesh, find_islands(mesh), downweight_slivers=True)
+    plain = fit_chart(mesh, chart, DOME)
+    calm = refine.Calm(mesh, chart, plain.net, np.full(len(plain.net), DOME.fair), DOME.bend)
+    room = float(refine.need(chart, plain, DOME).max()) + 0.01  # at first nothing is strict
+    everywhere, within = (refine._calmed_within(r, calm, plain, DOME) for r in (1e9, room))
+    cut, kept = (refine.need(chart, f, DOME) for f in (everywhere, within))
+    assert cut.max() > 1.5 * room and kept.max() < 1.1 * room
+    far = (np.abs(chart.uv - 0.5).max(axis=1) < 0.35) & (np.linalg.norm(chart.uv - chart.uv[112], axis=1) > 0.25)
+    assert far.sum() > 50
+    np.testing.assert_allclose(within.error[far], everywhere.error[far], atol=0.05)

@@ -68,8 +68,14 @@ def test_slopes_are_matched_besides_positions(net):
         np.testing.assert_allclose(slope, target, rtol=0.02)
 
 
-@pytest.mark.parametrize(("sloped", "bend"), [(False, 0.0), (True, 0.0), (True, 0.6)])
-def test_the_solution_is_that_of_the_functional(net, sloped, bend):
+PER_FACE = np.where(np.arange(30) < 15, 0.0, 0.9)
+
+
+@pytest.mark.parametrize(
+    ("sloped", "bend", "turned"),
+    [(False, 0.0, False), (True, 0.0, False), (True, 0.6, False), (True, 0.6, True), (True, PER_FACE, True)],
+)
+def test_the_solution_is_that_of_the_functional(net, sloped, bend, turned):
     """Dense algebra over the documented sum, with derivatives by central differences."""
     rng, fair = np.random.default_rng(5), 0.3
     uv = np.vstack([UV, rng.random((2000, 2)) * 0.98 + 0.01])
@@ -79,13 +85,14 @@ def test_the_solution_is_that_of_the_functional(net, sloped, bend):
     strength = weight.sum() / len(net)
     normal = dense.T @ (weight[:, None] * dense) + fair * strength * f.T @ f
     right = dense.T @ (weight[:, None] * targets)
-    slopes = None
+    slopes = turns = None
     if sloped:
         at, none = rng.random((30, 2)) * 0.9 + 0.05, csr_matrix((30, 1))
         span, heavy = rng.uniform(0.05, 0.2, (30, 2)), rng.uniform(50.0, 200.0, 30)
         wanted = rng.normal(size=(2, 30, 2))
         corners = at[:, None] + rng.uniform(-0.04, 0.04, (30, 4, 2))
         slopes = Slopes(at, span, none, none, heavy, corners), *wanted
+        turns = (rng.normal(size=(120, 2)), rng.normal(size=(120, 2))) if turned else None
         for axis in range(2):
             d = 1e-5 * np.eye(2)[axis]
 
@@ -97,8 +104,10 @@ def test_the_solution_is_that_of_the_functional(net, sloped, bend):
             right += rows.T @ (heavy[:, None] * wanted[axis])
             for k in range(4):
                 bent = slope(0.5 * (at + corners[:, k])) - rows
-                normal += bend * bent.T @ (heavy[:, None] * bent)
-    x = solve(net, b, weight, targets, fair, slopes, bend)
+                normal += bent.T @ ((bend * heavy)[:, None] * bent)
+                if turns is not None:
+                    right += bent.T @ ((bend * heavy)[:, None] * turns[axis][k::4])
+    x = solve(net, b, weight, targets, fair, slopes, bend, turns)
     np.testing.assert_allclose(x, np.linalg.solve(normal, right), atol=2e-4)
 
 

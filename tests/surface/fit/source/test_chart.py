@@ -73,11 +73,53 @@ def test_slopes_of_the_sheet_are_its_derivatives():
     np.testing.assert_allclose(s.mix_u @ MESH.vertices[:, 2], want, atol=0.02)
 
 
+@pytest.mark.parametrize("triangles", [False, True])
+def test_turns_go_from_a_face_to_the_mean_of_the_faces_around_each_corner(triangles):
+    """Of a quadratic function that is the change of its derivative, where faces lie evenly around a corner."""
+    faces = MESH.faces
+    if triangles:
+        faces = np.vstack([np.pad(faces[:, c], ((0, 0), (0, 1)), constant_values=-1) for c in ([0, 1, 2], [0, 2, 3])])
+    mesh = FitMesh(MESH.vertices, faces, MESH.uv, faces.copy(), MESH.names, MESH.deltas)
+    (island,) = find_islands(mesh)
+    s = face_slopes(island, len(mesh.vertices), np.ones(len(island.uv)))
+    assert s.turn_u.shape == (4 * len(faces), len(mesh.vertices))
+    linear = mesh.uv @ [3.0, -2.0]
+    assert max(np.abs(t @ linear).max() for t in (s.turn_u, s.turn_v)) < 1e-6
+    square = 50.0 * mesh.uv[:, 0] ** 2
+    turn = (s.turn_u @ square).reshape(-1, 4)
+    inside = ((s.corners > 1.5 / N) & (s.corners < 1 - 1.5 / N)).all(axis=2)
+    inside &= np.linalg.norm(s.corners - [0.5, 0.5], axis=2) > 0.25
+    wanted = 100.0 * (s.corners[..., 0] - s.uv[:, None, 0]) * s.span[:, :1]
+    if not triangles:
+        np.testing.assert_allclose(turn[inside], wanted[inside], rtol=1e-6, atol=1e-9)
+    slope = s.mix_u @ square / s.span[:, 0]
+    for f in range(0, len(faces), 61):
+        for k, corner in enumerate(faces[f]):
+            around = slope[(faces == corner).any(axis=1)] if corner >= 0 else slope[[f]]
+            assert turn[f, k] == pytest.approx((around.mean() - slope[f]) * s.span[f, 0], abs=1e-6)
+    assert np.abs(turn[inside]).max() > 0.05
+
+
+def test_faces_count_for_a_turn_by_their_weight_and_area():
+    weight = np.ones(len(ISLAND.uv))
+    weight[ISLAND.uv[:, 0] < 0.5] = 1e-6
+    s = face_slopes(ISLAND, len(MESH.vertices), weight)
+    square = 50.0 * MESH.uv[:, 0] ** 2
+    corner = int(np.argmin(np.abs(MESH.uv - [0.5, 0.2]).sum(axis=1)))  # faces on its left hardly count
+    rows = np.argwhere(MESH.faces == corner)
+    slope = s.mix_u @ square / s.span[:, 0]
+    right = slope[rows[:, 0]].max()
+    for f, k in rows:
+        assert (s.turn_u @ square)[4 * f + k] == pytest.approx((right - slope[f]) * s.span[f, 0], abs=1e-3)
+
+
 def test_joined_slopes_stand_one_after_the_other():
     one = face_slopes(ISLAND, len(MESH.vertices), np.ones(len(ISLAND.uv)))
     two = join_slopes([one, one])
     assert two.mix_u.shape == (2 * one.mix_u.shape[0], one.mix_u.shape[1])
     np.testing.assert_array_equal(two.uv[len(one.uv) :], one.uv)
+    assert two.turn_u.shape == (8 * len(one.uv), len(MESH.vertices))
+    assert abs(two.turn_v[4 * len(one.uv) :] - one.turn_v).max() == 0 and abs(one.turn_v).max() > 0
 
 
 def sliver_sheet() -> FitMesh:

@@ -93,14 +93,14 @@ def test_mean_value_weights_reproduce_every_flat_place() -> None:
     """Floater (2003): an inner point of a plane is the weighted mean of its neighbours."""
     rng = np.random.default_rng(1)
     at = UV + np.where(((UV > 0) & (UV < 1)).all(axis=1)[:, None], rng.uniform(-0.04, 0.04, UV.shape), 0)
-    weights = module._mean_value(lifted(at), TRI)
+    weights = module.mean_value(lifted(at), TRI)
     inner = ((UV > 0) & (UV < 1)).all(axis=1)
     np.testing.assert_allclose(np.asarray(weights.sum(axis=1)).ravel(), 1.0)
     np.testing.assert_allclose((weights @ at)[inner], at[inner], atol=1e-9)
     assert weights.data.min() > 0
     sliver = lifted(at)
     sliver[TRI[60, 0]] = sliver[TRI[60, 1]]
-    assert np.isfinite(module._mean_value(sliver, TRI).data).all()
+    assert np.isfinite(module.mean_value(sliver, TRI).data).all()
 
 
 def test_the_start_is_on_a_circle_of_the_surfaces_area() -> None:
@@ -215,11 +215,11 @@ def test_weights_are_the_same_in_any_unit_and_a_thousand_times_the_usual_at_most
     size: float,
 ) -> None:
     at = lifted(UV)
-    np.testing.assert_allclose(module._mean_value(size * at, TRI).toarray(), module._mean_value(at, TRI).toarray())
+    np.testing.assert_allclose(module.mean_value(size * at, TRI).toarray(), module.mean_value(at, TRI).toarray())
     # a fan about the first point, one of whose neighbours is far too near: its weight is a thousand times the usual
     fan = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0]])
     for near, least in ((1e-2, 30.0), (1e-7, 300.0)):
         fan[1, 0] = near
         tri = np.array([[0, k, k % 4 + 1] for k in (1, 2, 3, 4)])
-        row = module._mean_value(size * fan, tri).toarray()[0]
+        row = module.mean_value(size * fan, tri).toarray()[0]
         assert least < row[1] / row[3] <= 1010.0
