@@ -23,14 +23,11 @@ from surface.head.posing.contact import weights_at
 
 STICKS_OUT_MM = 6.0  # of a head of usual size: a surface so far from the mesh is mended
 TURNED_MM2 = 10.0  # area that is inside out, on a head of usual size, from which on it is mended
+GONE_MM2 = 1.0  # area inside out, for less of which nothing more is tried
 REFUSED_MM, REFUSED_MM2 = 20.0, 100.0  # distance from the mesh, and area inside out, for which a face is refused
 ASTRAY_MM = 4.0  # and one of which at rest a hundredth is further from it
 MAX_ROUNDS = 3
-RINGS = (
-    0,
-    1,
-    3,
-)  # of neighbours that are corrected with the points that hold a place, tried in turn until it gets better
+RINGS = 0, 1, 2, 3  # of neighbours that are corrected with the points that hold a place, tried in turn until it is good
 MIN_HOLD = 0.1  # least weight of a control point at a place that sticks out
 NO_PLACES = np.zeros((0, 2))
 NEIGHBOURS = 12  # control points that show where one belongs
@@ -50,15 +47,19 @@ def mend_spikes(
         wanted = _wanted(dense, limit) + _turned(dense, scale)
         if not wanted:
             break
+        best: tuple[HeadData, int, DenseErrors] | None = None
         for rings in RINGS:
             trial, moved = _mended(head, wanted, dense, rings)
             after = measure_dense(trial, mesh, sources, parts, limit)
-            if better := moved > 0 and _is_better(after, dense, wanted, limit):
-                break
-        if not better:
+            if moved > 0 and _is_better(after, dense, wanted, limit):
+                if best is None or _left(after, wanted) < 0.5 * _left(best[2], wanted):
+                    best = trial, moved, after
+                if _left(after, wanted) <= GONE_MM2 * scale**2:
+                    break
+        if best is None:
             break
+        head, moved, dense = best
         notes.append(f"mended: {moved} control points stuck out or were inside out: {_in_words(wanted)}")
-        head, dense = trial, after
     if notes:  # trials are measured with their contacts only
         dense = measure_dense(head, mesh, sources, parts, limit, fit_alone=True)
     return head, dense, notes
@@ -101,12 +102,14 @@ def _is_better(after: DenseErrors, before: DenseErrors, wanted: list[tuple[str, 
     limit : mm; parts may stick out by half of it, since points moved along a bent surface end a little beside it.
     """
     was, now = _furthest(before), _furthest(after)
-    over, left = (
-        {key: both.mm2 for key, both in d.turned.items() if key in {w[:2] for w in wanted}} for d in (before, after)
-    )
     gained = all(now.get(w[:2], np.inf) < 0.8 * was[w[:2]] for w in wanted if w[2].endswith("mm"))
-    gained &= sum(left.values()) <= 0.5 * sum(over.values()) or not any(w[2].endswith("²") for w in wanted)
+    gained &= _left(after, wanted) <= 0.5 * _left(before, wanted) or not any(w[2].endswith("²") for w in wanted)
     return gained and max(now.values(), default=0.0) <= max([0.5 * limit, *was.values()])
+
+
+def _left(dense: DenseErrors, wanted: list[tuple[str, str, str]]) -> float:
+    """Area, mm², that is inside out of what is mended."""
+    return sum(over.mm2 for key, over in dense.turned.items() if key in {w[:2] for w in wanted})
 
 
 def _furthest(dense: DenseErrors) -> dict[tuple[str, str], float]:

@@ -147,12 +147,12 @@ def _calmed_within(room: float, calm: Calm, fitted: Fitted, request: FitRequest)
     Where one does, and around there if that is not enough, the surface follows the mesh's faces as before.
     """
     chart, net = calm.chart, calm.net
-    plain, targets, rows = replace(chart, importance=None), samples_of(calm.mesh, chart.mix), basis(net, chart.uv)
-    before = need(plain, fitted, request)
+    targets, rows = samples_of(calm.mesh, chart.mix), basis(net, chart.uv)
+    before = need(chart, fitted, request)  # less on lids, through which an eyeball would come
     strict = before > room
     for _ in range(CALM_ROUNDS):
         trial = _measured(net, rows, targets, calm.solved(rows, targets, strict))
-        worse = need(plain, trial, request) > np.maximum(room, MAX_LOSS * before)
+        worse = need(chart, trial, request) > np.maximum(room, MAX_LOSS * before)
         if not worse.any():
             break
         strict = strict | (worse if (worse & ~strict).any() else beside(chart, worse))
