@@ -279,3 +279,19 @@ def test_where_a_calm_surface_would_leave_the_mesh_it_follows_that_as_before():
     far = (np.abs(chart.uv - 0.5).max(axis=1) < 0.35) & (np.linalg.norm(chart.uv - chart.uv[112], axis=1) > 0.25)
     assert far.sum() > 50
     np.testing.assert_allclose(within.error[far], everywhere.error[far], atol=0.05)
+
+
+def test_a_calm_surface_stays_nearer_to_the_mesh_where_that_is_more_important():
+    """As on lids, through which an eyeball would come otherwise."""
+    mesh = dome()
+    chart = make_chart(mesh, find_islands(mesh), downweight_slivers=True)
+    plain, half = fit_chart(mesh, chart, DOME), chart.uv[:, 0] < 0.5
+    important = replace(chart, importance=np.where(half, 3.0, 1.0))
+    room = 0.6 * float(refine.need(chart, plain, DOME).max())
+    fair = np.full(len(plain.net), DOME.fair)
+    alike, nearer = (
+        refine._calmed_within(room, refine.Calm(mesh, c, plain.net, fair, DOME.bend), plain, DOME)
+        for c in (chart, important)
+    )
+    inside = np.abs(chart.uv - 0.5).max(axis=1) < 0.4
+    assert rms(nearer.error[half & inside]) < 0.9 * rms(alike.error[half & inside])
