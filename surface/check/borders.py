@@ -24,6 +24,7 @@ from surface.head.posing.part import HeadPart
 from surface.mesh.mesh import border_edges
 
 SEWN_MM = 0.4  # distance within which two borders are sewn
+RIM_MM = 3.0  # between loose ends that are one: a seam ends up to a triangle before the rim that it divides
 ALONG_MM = 1.2  # edges with less border than this between them are neighbours, which are never sewn to each other
 MIN_WIDTH_MM = 1.2  # least width of a hole: the diameter of a round one, twice the height of a slit
 APART_MM = 1.0  # distance between borders sewn at rest from which a seam is open
@@ -141,7 +142,8 @@ def _opening_seams(subject: Subject, mouth: Mouth | None, borders: Borders, plac
 def _find_loops(subject: Subject, borders: Borders) -> Iterator[Ints]:
     """Return edges of every chain that is sewn to nothing, without the outer border of each sheet."""
     free, at = np.flatnonzero(~borders.sewn), borders.at(subject.rest)
-    chains = _find_chains(_join_ends(borders, at, free, SEWN_MM * subject.scale))
+    ends = _join_ends(borders, at, free, SEWN_MM * subject.scale)
+    chains = _find_chains(_join_loose(ends, at[free].reshape(-1, 3), RIM_MM * subject.scale))
     sheet = _find_sheets(subject, borders)
     lengths = np.linalg.norm(at[:, 1] - at[:, 0], axis=1)
     rows = [free[c] for c in chains]
@@ -159,6 +161,17 @@ def _join_ends(borders: Borders, at: Floats, rows: Ints, reach: float) -> Ints:
     ends, points = borders.ids[rows], at[rows].reshape(-1, 3)
     known = np.unique(ends, return_inverse=True)[1].reshape(-1)
     return joined_nearer(points, known, reach).reshape(-1, 2)
+
+
+def _join_loose(ends: Ints, points: Floats, reach: float) -> Ints:
+    """Return ``ends (k, 2)`` of edges at ``points (2 k, 3)``, where those that no other edge goes on from are one if
+    they are nearer than ``reach`` mm to each other."""
+    flat = ends.ravel()
+    loose = np.flatnonzero(np.bincount(flat)[flat] % 2 == 1)
+    near = joined_nearer(points[loose], np.unique(flat[loose], return_inverse=True)[1].reshape(-1), reach)
+    same = np.arange(flat.max(initial=-1) + 1)
+    same[flat[loose]] = flat[loose][near]
+    return same[ends]
 
 
 def _find_chains(ids: Ints) -> list[Ints]:

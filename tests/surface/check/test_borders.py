@@ -192,6 +192,18 @@ def test_ends_that_lie_together_are_one() -> None:
     assert borders._join_ends(found, at, np.zeros(0, np.int64), 0.4).shape == (0, 2)
 
 
+def test_loose_ends_of_a_rim_that_a_seam_divides_are_one() -> None:
+    """Two halves of a rim, 1 mm apart at one end and 2 at the other, and an edge far away."""
+    points = np.array([[0, 0, 0], [9, 9, 0], [9, 9, 0], [20, 0, 0], [0, -1, 0], [20, -2, 0], [60, 0, 0], [70, 0, 0]])
+    ends = np.array([[0, 1], [1, 2], [3, 4], [5, 6]])
+    joined = borders._join_loose(ends, points.astype(np.float64), 3.0)
+    assert [c.tolist() for c in borders._find_chains(joined)] == [[0, 1, 2], [3]]
+    assert [c.tolist() for c in borders._find_chains(borders._join_loose(ends, 1.6 * points, 3.0))] == [[0, 1, 2], [3]]
+    apart = borders._join_loose(ends, 4.0 * points, 3.0)
+    assert [c.tolist() for c in borders._find_chains(apart)] == [[0, 1], [2], [3]]
+    assert borders._join_loose(ends[:0], points[:0].astype(np.float64), 3.0).shape == (0, 2)
+
+
 def test_sheets_are_joined_by_triangles_and_by_seams() -> None:
     head = plain.subject(sheet("a", (0, 40)), sheet("b", (40, 80)), sheet("c", (100, 120)))
     label = borders._find_sheets(head, borders.find_borders(head))
