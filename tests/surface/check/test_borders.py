@@ -202,6 +202,10 @@ def test_loose_ends_of_a_rim_that_a_seam_divides_are_one() -> None:
     apart = borders._join_loose(ends, 4.0 * points, 3.0)
     assert [c.tolist() for c in borders._find_chains(apart)] == [[0, 1], [2], [3]]
     assert borders._join_loose(ends[:0], points[:0].astype(np.float64), 3.0).shape == (0, 2)
+    around = np.array([[0, 0, 1], [1, 0, 1], [1, 0, 1], [0, 1, 1], [0, 1, 1], [0, 0, 1]])  # a closed loop beside an end
+    loop = np.array([[7, 8], [8, 9], [9, 7]])
+    both = borders._join_loose(np.vstack([ends, loop]), np.vstack([points, around]).astype(np.float64), 3.0)
+    assert [c.tolist() for c in borders._find_chains(both)] == [[0, 1, 2], [3], [4, 5, 6]]
 
 
 def test_sheets_are_joined_by_triangles_and_by_seams() -> None:
