@@ -32,6 +32,7 @@ WHITE = (1.0, 1.0, 1.0)
 SKIN, PROP = "skin", "prop"
 MAX_NAMES = 4  # of pieces of one kind that a note lists
 FACE_MOTION = 0.5  # of the largest motion: a piece that shapes move this far belongs to the face, whatever its name
+SCAFFOLD = 0.01  # of all faces: a prop of fewer is what modellers put at a joint, though it moves with the face
 HAIR_MOTION = 0.05  # of the largest motion: hair that shapes move this far is fitted, so that it moves
 
 
@@ -114,7 +115,8 @@ def worn_faces(mesh: FitMesh) -> Bools:
 def without_clothes(mesh: FitMesh, worn: Bools | None = None) -> tuple[Bools, list[str]]:
     """Which faces (f,) belong to the person and not to clothes, hats or glasses; and notes on what was left out.
 
-    Names do not count where shapes move the piece as they move the face, or where nothing would be left. Faces that are
+    Names do not count where shapes move the piece as they move the face, but for small props, or where nothing would be
+    left. Faces that are
     ``worn`` (f,) are not the person's either, and are kept elsewhere: no note says that they are left out.
     """
     apart = np.zeros(len(mesh.faces), bool) if worn is None else worn
@@ -124,7 +126,8 @@ def without_clothes(mesh: FitMesh, worn: Bools | None = None) -> tuple[Bools, li
         kind, own = kind_of(name), (mesh.piece == k) & ~apart
         if kind.rule != "out" or not own.any():
             continue
-        if _moves(mesh, own):
+        scaffold = kind.name == "prop" and own.sum() < SCAFFOLD * len(own)
+        if _moves(mesh, own) and not scaffold:
             notes.append(f"{name!r}: named as {kind.name}, but shapes move it: kept as skin")
         else:
             kept &= ~own

@@ -104,6 +104,19 @@ def test_names_are_not_believed_against_what_shapes_do():
     assert kept.all() and notes == []  # nothing would be left
 
 
+def test_a_cube_at_a_joint_is_no_part_of_a_face_that_moves_with_it():
+    mesh = slit_sheet()
+    for faces, left_out in ((len(mesh.faces) // 200, True), (len(mesh.faces) // 50, False)):
+        piece = (np.arange(len(mesh.faces)) >= len(mesh.faces) - max(faces, 1)).astype(int)
+        near = mesh.faces[piece == 1]
+        deltas = np.zeros_like(mesh.deltas)
+        deltas[:, near[near >= 0]] = 5.0
+        kept, notes = without_clothes(replace(mesh, piece=piece, pieces=("face", "joint-jaw"), deltas=deltas))
+        np.testing.assert_array_equal(kept, (piece == 0) | (not left_out))
+        assert notes[0].startswith("prop left out" if left_out else "'joint-jaw': named as prop")
+        assert without_clothes(replace(mesh, piece=piece, pieces=("face", "Hoodie"), deltas=deltas))[0].all()
+
+
 def test_meshes_without_pieces_are_kept():
     assert without_clothes(slit_sheet())[0].all()
 
