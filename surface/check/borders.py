@@ -14,6 +14,7 @@ import numpy as np
 
 from surface.base.arrays import Bools, Floats, Floats32, Ints
 from surface.check.cells import joined_nearer
+from surface.check.components import joined
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import Mouth
 from surface.check.network import Network
@@ -176,7 +177,7 @@ def _join_loose(ends: Ints, points: Floats, reach: float) -> Ints:
 
 def _find_chains(ids: Ints) -> list[Ints]:
     """Return rows of edges (e, 2) of each connected component."""
-    label = _components(ids, int(ids.max(initial=-1)) + 1)
+    label = joined(int(ids.max(initial=-1)) + 1, *np.ascontiguousarray(ids.T))
     own = label[ids[:, 0]] if len(ids) else np.zeros(0, np.int64)
     return [np.flatnonzero(own == k) for k in np.unique(own)]
 
@@ -188,22 +189,7 @@ def _find_sheets(subject: Subject, borders: Borders) -> Ints:
     links = [_weld(subject, k)[:, [0, 1, 1, 2]].reshape(-1, 2) + starts[k] for k in np.unique(borders.part)]
     sewn = np.flatnonzero(borders.sewn)
     links.append(np.column_stack([borders.ids[sewn, 0], borders.ids[borders.mate[sewn], 0]]))
-    return _components(np.concatenate(links), int(starts[-1]))
-
-
-def _components(links: Ints, count: int) -> Ints:
-    """Return (count,): for each node the least number in its connected component; ``links (k, 2)`` connect nodes."""
-    label = np.arange(count)
-    while len(links):
-        least = np.minimum(label[links[:, 0]], label[links[:, 1]])
-        fresh = label.copy()
-        for end in (0, 1):
-            np.minimum.at(fresh, links[:, end], least)
-            np.minimum.at(fresh, label[links[:, end]], least)
-        fresh = fresh[fresh]
-        if np.array_equal(fresh, label):
-            break
-        label = fresh
+    label: Ints = joined(int(starts[-1]), *np.ascontiguousarray(np.concatenate(links).T))
     return label
 
 

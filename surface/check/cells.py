@@ -12,6 +12,7 @@ import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.jit import kernel
+from surface.check.components import root_of
 
 MAX_CUBE = float(1 << 60)  # cubes on either side of the origin; what lies further away shares the last one
 CORNER = 0.57  # edge of a cube relative to its diagonal, just below 1 / sqrt(3)
@@ -127,23 +128,14 @@ def joined_nearer(points: Floats, known: Ints, reach: float) -> Ints:
 
 
 @kernel
-def _root_of(root: Any, k: Any) -> Any:
-    """Return the last point of the chain of ``root`` from point k on, which becomes shorter by that."""
-    while root[k] != k:
-        root[k] = root[root[k]]
-        k = root[k]
-    return k
-
-
-@kernel
 def _join_cells(points: Any, one: Any, other: Any, reach: float, root: Any) -> None:
     """Join two cubes, whose points ``one (a,)`` and ``other (b,)`` each are one already, if any two are near."""
-    if _root_of(root, one[0]) == _root_of(root, other[0]):
+    if root_of(root, one[0]) == root_of(root, other[0]):
         return
     for i in one:
         for j in other:
             if _square(points[i], points[j]) < reach * reach:
-                root[_root_of(root, i)] = _root_of(root, j)
+                root[root_of(root, i)] = root_of(root, j)
                 return
 
 
@@ -155,7 +147,7 @@ def _join_near(points: Any, keys: Any, start: Any, order: Any, reach: float, roo
     """
     for k in range(len(keys)):
         for e in range(start[k] + 1, start[k + 1]):
-            root[_root_of(root, order[e])] = _root_of(root, order[start[k]])
+            root[root_of(root, order[e])] = root_of(root, order[start[k]])
     for k in range(len(keys)):
         x, y, z = keys[k]
         for i in range(25):
@@ -164,4 +156,4 @@ def _join_near(points: Any, keys: Any, start: Any, order: Any, reach: float, roo
                 if c > k:
                     _join_cells(points, order[start[k] : start[k + 1]], order[start[c] : start[c + 1]], reach, root)
     for k in range(len(root)):
-        root[k] = _root_of(root, k)
+        root[k] = root_of(root, k)

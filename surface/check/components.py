@@ -5,14 +5,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Ints
 from surface.base.jit import kernel
 
 
 @kernel
-def _root(parent, k):
-    """Return the first node of the component of node ``k``; ``parent (n,)`` int64 leads there, in fewer steps the next
-    time (path halving)."""
+def root_of(parent, k):
+    """Return the node at which the chain of ``parent (n,)`` int64 from node ``k`` on ends; it becomes shorter by that
+    (path halving)."""
     while parent[k] != k:
         parent[k] = parent[parent[k]]
         k = parent[k]
@@ -22,15 +22,8 @@ def _root(parent, k):
 @kernel
 def _join(parent, a, b):
     """Make one component of those of the nodes ``a`` and ``b`` in ``parent (n,)``."""
-    first, second = _root(parent, a), _root(parent, b)
+    first, second = root_of(parent, a), root_of(parent, b)
     parent[max(first, second)] = min(first, second)
-
-
-@kernel
-def _label(parent):
-    """Set each of ``parent (n,)`` to the first node of its component."""
-    for k in range(len(parent)):
-        parent[k] = _root(parent, k)
 
 
 @kernel
@@ -40,21 +33,6 @@ def joined(count: int, a: Ints, b: Ints) -> Ints:
     parent = np.arange(count)
     for k in range(len(a)):
         _join(parent, a[k], b[k])
-    _label(parent)
-    return parent
-
-
-@kernel
-def near_each_other(points: Floats, distance: float) -> Ints:
-    """Return (n,) int64: the first of the component of each of ``points (n, 3)``, where those no further apart than
-    ``distance``, in their unit, are joined."""
-    parent = np.arange(len(points))
-    for k in range(len(points)):
-        for m in range(k):
-            square = 0.0
-            for c in range(3):
-                square += (points[k, c] - points[m, c]) ** 2
-            if square <= distance * distance:
-                _join(parent, k, m)
-    _label(parent)
+    for k in range(count):
+        parent[k] = root_of(parent, k)
     return parent

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints
-from surface.check.components import near_each_other
+from surface.check.cells import joined_nearer
 from surface.check.crossings import NO_KIND, Crossings
 from surface.check.findings import AGAIN, Finding
 from surface.check.mouth import find_mouth
@@ -141,8 +141,8 @@ class _Body:
         if not len(rows):
             return None
         scale, order = self._subject.scale, np.argsort(-depth)
-        places = np.ascontiguousarray(self._rest[rows], np.float64)
-        label = near_each_other(places, TOGETHER_MM * scale)[order]
+        places = np.asarray(self._rest[rows], np.float64)
+        label = joined_nearer(places, np.arange(len(rows)), TOGETHER_MM * scale)[order]
         for k, row in enumerate(order.tolist()):
             near = order[: k + 1][label[: k + 1] == label[k]]
             if self._area[rows[near]].sum() >= AREA_MM2 * scale**2:

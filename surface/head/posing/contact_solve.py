@@ -151,7 +151,6 @@ def part_sides(
     First lids are moved onto the eyeball, which opens them, and ``seal``, 0..1, of the opening is closed. Returns the
     number of passes, at most ``passes``; 0 if the last answer still holds.
 
-
     press, soft : as in :func:`.contact_kernels.find_overlap`; rows : samples of a column.
     apart : (2 c, k) how far the moved points go up where the sides of a column part by 1.
     opening : before, profiles (2, c, m, 3), overlap (2, c), the answer (k, 3), gaps at rest (2, c), and room for

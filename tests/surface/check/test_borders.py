@@ -10,6 +10,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from surface.check import borders
+from surface.check.components import joined
 from surface.check.mouth import Mouth
 from surface.check.network import Network
 from surface.check.places import Places
@@ -169,9 +170,9 @@ def test_a_seam_that_slides_along_itself_stays_shut() -> None:
 def test_components_are_those_of_scipy(seed: int) -> None:
     links = np.random.default_rng(seed).integers(0, 60, (45, 2))
     _, wanted = connected_components(coo_array((np.ones(45), links.T), (60, 60)), directed=False)
-    label = borders._components(links, 60)
+    label = joined(60, *np.ascontiguousarray(links.T))
     assert [label[k] for k in range(60)] == [int(np.flatnonzero(wanted == wanted[k])[0]) for k in range(60)]
-    assert borders._components(np.zeros((0, 2), np.int64), 3).tolist() == [0, 1, 2]
+    assert joined(3, *np.zeros((2, 0), np.int64)).tolist() == [0, 1, 2]
 
 
 def test_chains_are_edges_that_share_ends() -> None:

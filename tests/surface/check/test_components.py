@@ -7,7 +7,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from surface.check.components import joined, near_each_other
+from surface.check.cells import joined_nearer
+from surface.check.components import joined
 
 
 def same_parts(one: np.ndarray, two: np.ndarray) -> bool:
@@ -35,7 +36,8 @@ def test_points_near_each_other_are_one_component() -> None:
     for seed in range(10):
         points = np.random.default_rng(seed).uniform(0, 10, (80, 3))
         pairs = cKDTree(points).query_pairs(1.5, output_type="ndarray").astype(np.int64)
-        assert same_parts(near_each_other(points, 1.5), by_scipy(80, *pairs.T))
+        assert same_parts(joined_nearer(points, np.arange(80), 1.5), by_scipy(80, *pairs.T))
+    every = np.arange(5)
     line = np.arange(5.0)[:, None] * np.array([1.0, 0.0, 0.0])
-    assert len(set(near_each_other(line, 1.0))) == 1 and len(set(near_each_other(line, 0.99))) == 5
-    assert len(near_each_other(np.zeros((0, 3)), 1.0)) == 0
+    assert len(set(joined_nearer(line, every, 1.0 + 1e-9))) == 1 and len(set(joined_nearer(line, every, 0.99))) == 5
+    assert len(joined_nearer(np.zeros((0, 3)), every[:0], 1.0)) == 0
