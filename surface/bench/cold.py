@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Floats32
 from surface.dcp import DCPSurface
 from surface.deform.deformation import Deformation
 from surface.deform.fixed import take_all
@@ -138,9 +138,15 @@ def zero_fraction(deformations: Sequence[Deformation[DCPSurface]]) -> float:
 
     Weights that are stored as factors do not count.
     """
-    kept = [t for d in deformations for t in (d.lists.value[: d.lists.used], take_all(d.storage.packed.packed).ravel())]
+    kept = [t for d in deformations for t in (d.lists.value[: d.lists.used], _packed_weights(d))]
     total = sum(len(table) for table in kept)
     return 1.0 - sum(int(np.count_nonzero(table)) for table in kept) / total if total else 0.0
+
+
+def _packed_weights(deformation: Deformation[DCPSurface]) -> Floats32:
+    """Return (k,): all packed weights of a deformation, each times a power of two."""
+    packed = deformation.storage.packed
+    return take_all(packed.packed, 0, len(packed.entry_row)).ravel()
 
 
 def _chain(calls: Sequence[Call]) -> Call:

@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from surface.base.arrays import Bools, Floats, Floats32, Ints, Shorts
 from surface.base.jit import kernel
 
-from .fixed import BYTES, power_of, put, take_all
+from .fixed import power_of, put, room, take_all
 from .lists import LANES, Lists
 
 PLAIN = -1  # in ``packed_at``: the cell is not packed; in ``order_at``: its lanes follow the mesh's order
@@ -44,8 +44,8 @@ class Packed:
     packed_at : (c,) int64, where every cell's tiles start in ``tile_entry``; PLAIN where the cell is not packed
     tile_entry : (t,) int64, where every tile's entries start; after a cell's last tile, where these end
     entry_row : (e,) uint16, the row of each entry's point in the cell's list
-    packed : (24 e,) uint8, fixed-point numbers; packed_slope : (16 e,) int16 in steps, or empty for a mesh without
-        normals
+    packed : (:func:`.fixed.room` of e,) uint8, fixed-point numbers; packed_slope : (16 e,) int16 in steps, or empty
+        for a mesh without normals
     places_at : (c,) int64, where every cell's rows start in ``places``
     places : (p,) uint16, by row and tile: the entry's number in its tile, from 1 on; 0 if there is none
     order_at : (c,) int64, where every cell's lanes start in ``order``; PLAIN where they follow the mesh's order
@@ -110,7 +110,7 @@ def pack(lists: Lists, order: Order, wanted: Bools, points: Floats) -> Packed:
     sloped, ends = len(lists.slope) > 0, int((tiles + 1)[chosen].sum())
     made = Packed(
         packed_at=_cell_starts(tiles + 1, chosen), tile_entry=np.zeros(ends, np.int64),
-        entry_row=np.zeros(entries, np.uint16), packed=np.zeros(BYTES * entries, np.uint8),
+        entry_row=np.zeros(entries, np.uint16), packed=np.zeros(room(entries), np.uint8),
         packed_slope=np.zeros(2 * LANES * entries * sloped, np.int16),
         places_at=_cell_starts(blocks, chosen), places=np.zeros(int(blocks[chosen].sum()), np.uint16),
         order_at=_cell_starts(LANES * tiles, moved), order=order.order[np.repeat(moved, LANES * tiles)],
@@ -145,7 +145,7 @@ def unpack_cell(lists: Lists, made: Packed, c: int) -> list[Floats32]:
     tile = np.repeat(np.arange(tiles), np.diff(starts))
     row = made.entry_row[which].astype(np.int64)
     lanes = made.order[at : at + size].astype(np.int64) if at >= 0 else np.arange(size)
-    weights = take_all(made.packed[BYTES * which.start : BYTES * which.stop])
+    weights = take_all(made.packed, which.start, which.stop)
     power = made.power.reshape(-1, LANES)[first : first + tiles]
     tables = [np.ldexp(weights, power[tile])[:, None]]
     if len(made.slope_step):

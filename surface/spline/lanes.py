@@ -1,7 +1,7 @@
-"""SIMD vectors of eight float32 numbers inside compiled kernels.
+"""SIMD vectors of eight float32 numbers inside compiled kernels, and pairs of these.
 
 Sums over control points stay in registers this way, whatever the loop around them looks like. LLVM turns the
-operations into AVX, SSE or NEON instructions.
+operations into AVX, SSE or NEON instructions. A pair is one register where the processor has AVX-512, else two.
 """
 
 # mypy: allow-untyped-defs, allow-untyped-calls, allow-incomplete-defs
@@ -16,24 +16,27 @@ from numba.extending import intrinsic, models, register_model
 
 LANES = 8
 VECTOR = ir.VectorType(ir.FloatType(), LANES)
+PAIR = ir.VectorType(ir.FloatType(), 2 * LANES)
 INDEX = ir.IntType(32)
 INDICES = ir.VectorType(INDEX, LANES)
-SHORTS = ir.VectorType(ir.IntType(16), LANES)
-OCTETS = ir.VectorType(ir.IntType(8), LANES)
+SHORTS, PAIR_OF_SHORTS = (ir.VectorType(ir.IntType(16), count) for count in (LANES, 2 * LANES))
+OCTETS, PAIR_OF_OCTETS = (ir.VectorType(ir.IntType(8), count) for count in (LANES, 2 * LANES))
+BOTH = ir.Constant(ir.VectorType(INDEX, 2 * LANES), list(range(2 * LANES)))  # all lanes of two vectors, in order
 PAIRS = [k // 2 + k % 2 * LANES for k in range(2 * LANES)]  # x0 y0 x1 y1 ... of two vectors
 
 
-def _has_avx2() -> bool:
-    """Whether numba compiles for a processor with AVX2."""
+def _has(feature):
+    """Whether numba compiles for a processor with this feature, by LLVM's name for it."""
     if config.CPU_NAME is not None or config.CPU_FEATURES is not None:
-        return "+avx2" in (config.CPU_FEATURES or "").split(",")
+        return f"+{feature}" in (config.CPU_FEATURES or "").split(",")
     try:
-        return bool(binding.get_host_cpu_features().get("avx2"))
+        return bool(binding.get_host_cpu_features().get(feature))
     except RuntimeError:  # LLVM does not know this processor
         return False
 
 
-PICKS_FAST = _has_avx2()  # whether :func:`pick` is one instruction
+PICKS_FAST = _has("avx2")  # whether :func:`pick` is one instruction
+PAIRS_FAST = _has("avx512vl")  # whether a pair is one register, and there are registers for twelve of them
 FLAGS = ("contract", "nsz", "arcp")  # a multiplication and an addition may become one instruction
 
 
@@ -44,7 +47,14 @@ class LanesType(types.Type):
         super().__init__(name="float32x8")
 
 
-lanes = LanesType()
+class PairType(types.Type):
+    """numba's name for two vectors in one."""
+
+    def __init__(self) -> None:
+        super().__init__(name="float32x16")
+
+
+lanes, pair = LanesType(), PairType()
 
 
 @register_model(LanesType)
@@ -53,6 +63,14 @@ class LanesModel(models.PrimitiveModel):
 
     def __init__(self, manager, kind) -> None:
         super().__init__(manager, kind, VECTOR)
+
+
+@register_model(PairType)
+class PairModel(models.PrimitiveModel):
+    """The pair lives in one register, or in two."""
+
+    def __init__(self, manager, kind) -> None:
+        super().__init__(manager, kind, PAIR)
 
 
 def _pointer(context, builder, kind, array, index):
@@ -103,16 +121,78 @@ def load(context, builder, kinds, args):
 
 @_operation(lanes, None, types.intp)
 def load_fixed(context, builder, kinds, args):
-    """Load eight fixed-point numbers from ``array[index : index + 24]`` of uint8: the whole part of each, rounded down,
-    as 16 signed bits, the lower byte first; then what is to be added to each, in 256ths, as 8 bits. float32 holds the
-    sums exactly."""
-    start = builder.gep(context.make_array(kinds[0])(context, builder, args[0]).data, [args[1]])
-    rest = builder.gep(start, [ir.IntType(types.intp.bitwidth)(2 * LANES)])
-    whole = builder.load(builder.bitcast(start, SHORTS.as_pointer()), align=1)
-    part = builder.load(builder.bitcast(rest, OCTETS.as_pointer()), align=1)
-    step = ir.Constant(VECTOR, [1.0 / 256.0] * LANES)
-    scaled = builder.fmul(builder.uitofp(part, VECTOR), step, flags=FLAGS)
-    return builder.fadd(scaled, builder.sitofp(whole, VECTOR), flags=FLAGS)
+    """Load the eight with number ``index`` of the fixed-point numbers in ``array`` of uint8: of each the whole part,
+    rounded down, as 16 signed bits, the lower byte first, and what is to be added to it, in 256ths, as 8 bits. float32
+    holds the sums exactly. Two eights lie together: whole parts of both, then what is to be added to both."""
+    wide = ir.IntType(types.intp.bitwidth)
+    second, first = builder.and_(args[1], wide(1)), builder.mul(builder.lshr(args[1], wide(1)), wide(6 * LANES))
+    whole = builder.add(first, builder.mul(second, wide(2 * LANES)))
+    rest = builder.add(first, builder.add(wide(4 * LANES), builder.mul(second, wide(LANES))))
+    return _load_fixed(context, builder, kinds[0], args[0], whole, rest, (SHORTS, OCTETS, VECTOR))
+
+
+@_operation(pair, None, types.intp)
+def load_fixed_pair(context, builder, kinds, args):
+    """Load two eights as :func:`load_fixed`, of which the first has the even number ``index``."""
+    wide = ir.IntType(types.intp.bitwidth)
+    whole = builder.mul(args[1], wide(3 * LANES))
+    rest = builder.add(whole, wide(4 * LANES))
+    return _load_fixed(context, builder, kinds[0], args[0], whole, rest, (PAIR_OF_SHORTS, PAIR_OF_OCTETS, PAIR))
+
+
+def _load_fixed(context, builder, kind, array, whole, rest, forms):
+    """Fixed-point numbers whose whole parts begin at byte ``whole`` of an array, and the rest at byte ``rest``."""
+    data = context.make_array(kind)(context, builder, array).data
+    parts = (
+        builder.load(builder.bitcast(builder.gep(data, [at]), form.as_pointer()), align=1)
+        for at, form in zip((whole, rest), forms, strict=False)
+    )
+    shorts, octets = parts
+    step = ir.Constant(forms[2], [1.0 / 256.0] * forms[2].count)
+    scaled = builder.fmul(builder.uitofp(octets, forms[2]), step, flags=FLAGS)
+    return builder.fadd(scaled, builder.sitofp(shorts, forms[2]), flags=FLAGS)
+
+
+@_operation(pair, None, types.intp)
+def load_pair(context, builder, kinds, args):
+    """Load ``array[index : index + 16]`` of int16 as float32."""
+    data = context.make_array(kinds[0])(context, builder, args[0]).data
+    shorts = builder.bitcast(builder.gep(data, [args[1]]), PAIR_OF_SHORTS.as_pointer())
+    return builder.sitofp(builder.load(shorts, align=2), PAIR)
+
+
+@_operation(pair)
+def zero_pair(context, builder, kinds, args):
+    """All lanes 0."""
+    return ir.Constant(PAIR, [0.0] * (2 * LANES))
+
+
+@_operation(pair, pair, None, types.intp, types.intp, pair)
+def fma_pair(context, builder, kinds, args):
+    """``a * b + c``, where the first eight lanes of b are ``array[i]`` and the others ``array[j]``, for
+    ``a, array, i, j, c``."""
+    data = context.make_array(kinds[1])(context, builder, args[1]).data
+    halves = (_splat(builder, builder.load(builder.gep(data, [at]))) for at in args[2:4])
+    product = builder.fmul(args[0], builder.shuffle_vector(*halves, BOTH), flags=FLAGS)
+    return builder.fadd(product, args[4], flags=FLAGS)
+
+
+@_operation(pair, pair, pair)
+def add_pairs(context, builder, kinds, args):
+    """The sums of two pairs, lane by lane."""
+    return builder.fadd(args[0], args[1], flags=FLAGS)
+
+
+def _half(first):
+    @_operation(lanes, pair)
+    def half(context, builder, kinds, args):
+        order = ir.Constant(ir.VectorType(INDEX, LANES), list(range(first, first + LANES)))
+        return builder.shuffle_vector(args[0], ir.Constant(PAIR, ir.Undefined), order)
+
+    return half
+
+
+first_of, second_of = _half(0), _half(LANES)  # eight of the sixteen lanes of a pair
 
 
 @_operation(lanes, None, types.intp, None, types.intp)

@@ -84,7 +84,7 @@ def test_the_largest_derivatives_stay_within_16_bits_whichever_way_they_are_roun
 def test_no_entry_is_all_zero_and_every_row_knows_its_entries() -> None:
     lists = build_lists(*body(), False)
     order, made = packed(lists)
-    weights, held = take_all(made.packed), np.repeat(made.packed_at >= 0, sizes(lists))
+    weights, held = take_all(made.packed, 0, len(made.entry_row)), np.repeat(made.packed_at >= 0, sizes(lists))
     assert len(weights) == sum(order.entries[made.packed_at >= 0])
     few = np.count_nonzero(lists.value[held]) - np.count_nonzero(weights)  # less than half a step
     assert 0 <= few <= np.count_nonzero((lists.value[held] > 0.0) & (lists.value[held] < 2.0**-23 * lists.value.max()))
@@ -120,7 +120,7 @@ def test_vertices_are_put_where_they_share_points() -> None:
     order, made = packed(lists)
     assert order.moved.tolist() == [True] and order.entries.tolist() == [4]
     assert order.order.tolist() == [*range(0, 16, 2), *range(1, 16, 2)]
-    assert (take_all(made.packed) != 0).all()
+    assert (take_all(made.packed, 0, len(made.entry_row)) != 0).all()
 
 
 def test_cells_without_zeros_keep_blocks() -> None:

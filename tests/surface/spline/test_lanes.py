@@ -47,17 +47,37 @@ def test_short_numbers_are_loaded_as_they_are() -> None:
 
 
 def test_fixed_point_numbers_are_whole_parts_and_256ths() -> None:
+    """Of two pairs of eights, each is loaded alone, and the second pair at once."""
+
     @njit
     def loaded(octets, out):
-        lanes.store(out, 0, lanes.load_fixed(octets, 3))
+        for k in range(4):
+            lanes.store(out, 8 * k, lanes.load_fixed(octets, k))
+        both = lanes.load_fixed_pair(octets, 2)
+        lanes.store(out, 32, lanes.first_of(both))
+        lanes.store(out, 40, lanes.second_of(both))
 
-    numbers = np.array([0.0, 1.0, -1.0, 32767 + 255 / 256, -32768.0, 1 / 256, -1 / 256, 300.5])
+    ends = [0.0, 1.0, -1.0, 32767 + 255 / 256, -32768.0, 1 / 256, -1 / 256, 300.5]
+    numbers = np.array([ends, ends[::-1], np.arange(8.0), ends]).reshape(2, 16)
     whole = np.floor(numbers)
-    upper = np.frombuffer(whole.astype("<i2").tobytes(), np.uint8)
-    octets = np.concatenate([[9, 9, 9], upper, 256 * (numbers - whole)])
-    out = np.empty(8, np.float32)
-    loaded(octets.astype(np.uint8), out)
-    assert out.tolist() == numbers.tolist()
+    upper = np.frombuffer(whole.astype("<i2").tobytes(), np.uint8).reshape(2, 32)
+    octets = np.concatenate([upper, 256 * (numbers - whole)], axis=1).astype(np.uint8).ravel()
+    out = np.empty(48, np.float32)
+    loaded(octets, out)
+    assert out.tolist() == [*numbers.ravel().tolist(), *numbers[1].tolist()]
+
+
+def test_pairs_take_two_numbers_of_a_table() -> None:
+    @njit
+    def summed(shorts, table, out):
+        both = lanes.fma_pair(lanes.load_pair(shorts, 1), table, 2, 0, lanes.zero_pair())
+        both = lanes.add_pairs(both, lanes.load_pair(shorts, 0))
+        lanes.store(out, 0, lanes.first_of(both))
+        lanes.store(out, 8, lanes.second_of(both))
+
+    shorts, out = np.arange(-3, 14, dtype=np.int16) * 100, np.empty(16, np.float32)
+    summed(shorts, np.array([0.5, 99.0, -2.0], np.float32), out)
+    assert out.tolist() == (shorts[1:] * np.repeat([-2.0, 0.5], 8) + shorts[:-1]).tolist()
 
 
 def test_the_greatest_of_three_and_whether_any_lane_reaches_a_number() -> None:
@@ -98,9 +118,9 @@ def test_lanes_are_picked_with_and_without_an_instruction_for_it(fast: bool, mon
 def test_a_processor_chosen_for_numba_has_what_its_features_say(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lanes.config, "CPU_NAME", "generic")
     monkeypatch.setattr(lanes.config, "CPU_FEATURES", None)
-    assert lanes._has_avx2() is False
+    assert lanes._has("avx2") is False
     monkeypatch.setattr(lanes.config, "CPU_FEATURES", "+avx,+avx2")
-    assert lanes._has_avx2() is True
+    assert lanes._has("avx2") is True
 
 
 @njit
