@@ -1,22 +1,17 @@
-"""Calls compiled kernels with one table of addresses instead of many arrays.
+"""The arrays of a deformation as one table of addresses, see :mod:`surface.base.addresses`.
 
-A compiled function inspects every array that Python passes to it, which takes longer than a small update. So the
-arrays are passed as a table of their addresses, which is made again whenever one of them is replaced. Compiled
-functions pass that table to each other, too: to pass on so many arrays takes longer than a small update.
+The table is made again whenever one of them is replaced.
 """
 
-# mypy: allow-untyped-defs, disable-error-code="import-untyped, call-arg, attr-defined"
+# mypy: allow-untyped-defs, disable-error-code="call-arg"
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 import numpy as np
-from llvmlite import ir
-from numba import carray
-from numba.core import types
-from numba.extending import intrinsic
 
-from surface.base.jit import inlined, merged
+from surface.base.addresses import flat, make_table, rows
+from surface.base.jit import merged
 
 NAMES = (
     "cell_start", "tile_start", "rows", "room", "at", "ids_at", "ids", "value", "slope",
@@ -39,54 +34,29 @@ Kernels unpack that tuple once.
 
 def address_table(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
     """Return (2 k,) int64: address and length of the k arrays of ``NAMES``; the arrays must outlive the table."""
-    table = []
-    for name in NAMES:
-        if not arrays[name].flags.c_contiguous:
-            raise ValueError(f"{name}: must be contiguous")
-        table += [arrays[name].ctypes.data, len(arrays[name])]
-    return np.array(table, dtype=np.int64)
-
-
-@intrinsic
-def _pointer(typingctx, address):
-    """Return an address as a pointer."""
-
-    def generate(context, builder, signature, args):
-        return builder.inttoptr(args[0], ir.IntType(8).as_pointer())
-
-    return types.voidptr(types.int64), generate
-
-
-@inlined
-def _flat(table, k, dtype):
-    return carray(_pointer(table[2 * k]), (table[2 * k + 1],), dtype)
-
-
-@inlined
-def _rows(table, k, width, dtype):
-    return carray(_pointer(table[2 * k]), (table[2 * k + 1], width), dtype)
+    return make_table({name: arrays[name] for name in NAMES})
 
 
 @merged
 def arrays_of(table):
     """Return the arrays of a table; types and widths are in the order of ``NAMES``."""
     return (
-        _flat(table, 0, np.int64), _flat(table, 1, np.int64), _flat(table, 2, np.int64), _flat(table, 3, np.int64),
-        _flat(table, 4, np.int64), _flat(table, 5, np.int64), _flat(table, 6, np.int32), _flat(table, 7, np.float32),
-        _flat(table, 8, np.float32), _flat(table, 9, np.int64), _flat(table, 10, np.int64),
-        _flat(table, 11, np.int32), _flat(table, 12, np.int32), _rows(table, 13, 3, np.float64),
-        _rows(table, 14, 3, np.float64), _flat(table, 15, np.float32), _flat(table, 16, np.float32),
-        _flat(table, 17, np.float32), _flat(table, 18, np.int64), _flat(table, 19, np.float32),
-        _flat(table, 20, np.float32), _rows(table, 21, 2, np.int64), _flat(table, 22, np.int64),
-        _flat(table, 23, np.int32), _flat(table, 24, np.int32), _flat(table, 25, np.int64),
-        _rows(table, 26, 3, np.float64), _rows(table, 27, 3, np.float32), _flat(table, 28, np.float32),
-        _flat(table, 29, np.float64), _flat(table, 30, np.float64), _flat(table, 31, np.float64),
-        _flat(table, 32, np.float64),
-        _flat(table, 33, np.int64), _flat(table, 34, np.int64), _flat(table, 35, np.int32), _flat(table, 36, np.int32),
-        _flat(table, 37, np.float32), _flat(table, 38, np.int32),
-        _flat(table, 39, np.int64), _flat(table, 40, np.int64), _flat(table, 41, np.uint16),
-        _flat(table, 42, np.uint8), _flat(table, 43, np.int16), _flat(table, 44, np.int64),
-        _flat(table, 45, np.uint16), _flat(table, 46, np.int64), _flat(table, 47, np.uint16),
-        _flat(table, 48, np.uint8), _flat(table, 49, np.float64), _flat(table, 50, np.int32),
-        _flat(table, 51, np.int16),
+        flat(table, 0, np.int64), flat(table, 1, np.int64), flat(table, 2, np.int64), flat(table, 3, np.int64),
+        flat(table, 4, np.int64), flat(table, 5, np.int64), flat(table, 6, np.int32), flat(table, 7, np.float32),
+        flat(table, 8, np.float32), flat(table, 9, np.int64), flat(table, 10, np.int64),
+        flat(table, 11, np.int32), flat(table, 12, np.int32), rows(table, 13, 3, np.float64),
+        rows(table, 14, 3, np.float64), flat(table, 15, np.float32), flat(table, 16, np.float32),
+        flat(table, 17, np.float32), flat(table, 18, np.int64), flat(table, 19, np.float32),
+        flat(table, 20, np.float32), rows(table, 21, 2, np.int64), flat(table, 22, np.int64),
+        flat(table, 23, np.int32), flat(table, 24, np.int32), flat(table, 25, np.int64),
+        rows(table, 26, 3, np.float64), rows(table, 27, 3, np.float32), flat(table, 28, np.float32),
+        flat(table, 29, np.float64), flat(table, 30, np.float64), flat(table, 31, np.float64),
+        flat(table, 32, np.float64),
+        flat(table, 33, np.int64), flat(table, 34, np.int64), flat(table, 35, np.int32), flat(table, 36, np.int32),
+        flat(table, 37, np.float32), flat(table, 38, np.int32),
+        flat(table, 39, np.int64), flat(table, 40, np.int64), flat(table, 41, np.uint16),
+        flat(table, 42, np.uint8), flat(table, 43, np.int16), flat(table, 44, np.int64),
+        flat(table, 45, np.uint16), flat(table, 46, np.int64), flat(table, 47, np.uint16),
+        flat(table, 48, np.uint8), flat(table, 49, np.float64), flat(table, 50, np.int32),
+        flat(table, 51, np.int16),
     )  # fmt: skip

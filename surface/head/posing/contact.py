@@ -13,13 +13,15 @@ from hashlib import blake2b
 
 import numpy as np
 
-from surface.base.arrays import Floats, Ints, Shorts
+from surface.base.addresses import make_table
+from surface.base.arrays import Array, Floats, Ints, Shorts
 from surface.dcp import DCPSurface
 from surface.deform.lists import LANES
 from surface.head.model.data import Contact, HeadData
 from surface.head.model.parameters import smoothstep
 from surface.head.posing.contact_kernels import (
     MAX_SHORT,
+    PAIR,
     SHARE_STEP,
     find_gaps,
     find_heights,
@@ -27,7 +29,7 @@ from surface.head.posing.contact_kernels import (
     move_points,
     trace_profiles,
 )
-from surface.head.posing.contact_solve import clear_eyeball, gather_near, part_sides, place_all
+from surface.head.posing.contact_solve import NAMES, SIDES, clear_bound, gather_near, part_bound, place_all
 from surface.spline.kernels import fill_rows, row_capacity
 
 CONTACT_SHARE = 2 / 3  # fraction of the rows at an opening that can touch the other side; in the rest corrections fade
@@ -79,7 +81,7 @@ class EyeballClearance:
     ----------
     ids : (k,) control points that are moved; table : (s, k) how far each moves per sample that moves by 1.
     samples : (s, 4) as placed last: x, y and z from the eyeball's centre, and depth.
-    sampling, limits, work : what the kernels of :mod:`.contact_solve` take.
+    sampling, limits, work : what the kernels of :mod:`.contact_solve` take; arrays : in the order of their NAMES.
     """
 
     def __init__(
@@ -92,16 +94,20 @@ class EyeballClearance:
         self.sampling = near, *tile_weights(start, local, share), np.searchsorted(near, self.ids)
         self.samples, (s, p) = np.empty((len(places), 4)), (len(places), len(near))
         self.work = (np.zeros((p, 3)), np.full((p, 3), np.nan), np.zeros((p, 3), np.float32),
-                     np.zeros(3 * LANES, np.float32), self.samples, np.zeros(s), np.zeros(s), np.zeros(4))  # fmt: skip
+                     np.zeros(3 * PAIR, np.float32), self.samples, np.zeros(s), np.zeros(s), np.zeros(4))  # fmt: skip
         gather_near(surface.points, near, self.eye, self.work[0])
         place_all(self.radius > 0.0, self.sampling, self.work)
         limits = height_limits(self.samples, self.radius, held=held, cling=cling)
-        self.limits = (*limits, self.radius, LIFT_GAIN, *by_lanes(self.table))
+        tables = by_lanes(self.table)
+        self.limits = (*limits, self.radius, LIFT_GAIN, *tables)
+        ball = np.array([*self.eye, self.radius, LIFT_GAIN])
+        self.arrays: list[Array] = [*self.sampling, *limits, *tables, *self.work, ball]
+        self._bound = make_table(dict(zip(NAMES, self.arrays, strict=True)))
 
     def apply(self, axis: Floats, points: Floats) -> float:
         """Move control points (n, 3) in place; ``axis (3,)`` is where the eye looks. Returns the largest error, mm,
         that was found last."""
-        return float(clear_eyeball(points, self.eye, axis, PASSES, TOLERANCE_MM, self.sampling, self.limits, self.work))
+        return float(clear_bound(self._bound, points, axis, PASSES, TOLERANCE_MM))
 
 
 class ContactSolver:
@@ -125,7 +131,10 @@ class ContactSolver:
         find_gaps(self._opening[0], self._opening[4])
         close_nearly(self._opening[4], np.ones(columns) if contact.cling else corner_fade(columns))
         self.push = np.zeros(4 * columns * profiles[2] if lids else 2 * columns)
-        self._press, self._rows = OVERLAP_MM[lids], rows
+        self._rows = rows
+        form = np.array([OVERLAP_MM[lids], SOFT_MM, rows, columns, profiles[2]], np.float64)
+        arrays = [*self._sides.arrays, *self._opening, self._apart, self.push, form]
+        self._kept, self._bound = arrays, make_table(dict(zip((*NAMES, *SIDES), arrays, strict=True)))
 
     def apply(self, axis: Floats, points: Floats, seal: float = 0.0) -> Floats:
         """Correct control points (n, 3) in place; return what :meth:`Follower.apply` takes, overwritten by each
@@ -136,11 +145,7 @@ class ContactSolver:
         firmly lips stay together. Where neither the points near the opening nor the eye nor the seal have changed, the
         last answer is used again.
         """
-        sides = self._sides
-        self.passes = part_sides(
-            points, sides.eye, axis, seal, PASSES, TOLERANCE_MM, self._press, SOFT_MM, self._rows, self._apart,
-            self._opening, self.push, sides.sampling, sides.limits, sides.work,
-        )  # fmt: skip
+        self.passes = part_bound(self._bound, points, axis, seal, PASSES, TOLERANCE_MM)
         return self.push
 
     def gaps(self) -> Floats:
@@ -256,14 +261,14 @@ def tile_weights(start: Ints, ids: Ints, share: Floats) -> tuple[Ints, Ints, Sho
 
 
 def by_lanes(table: Floats) -> tuple[Shorts, Floats]:
-    """Return ``table (s, k)`` for eight columns at a time, (8 b s,): of the first eight, row after row, then of the
+    """Return ``table (s, k)`` for sixteen columns at a time, (16 b s,): of the first, row after row, then of the
     next; and the step (k,) of each column, of which its numbers are whole multiples: reading what other work has driven
     out of the caches takes longer than the sums, and so half as long as with float32."""
     rows, columns = table.shape
-    padded = np.zeros((rows, -(-columns // LANES) * LANES), np.int16)
+    padded = np.zeros((rows, -(-columns // PAIR) * PAIR), np.int16)
     steps = np.maximum(np.abs(table).max(axis=0), 1e-30) / MAX_SHORT
     padded[:, :columns] = np.rint(table / steps)
-    return np.ascontiguousarray(padded.reshape(rows, -1, LANES).transpose(1, 0, 2)).ravel(), steps
+    return np.ascontiguousarray(padded.reshape(rows, -1, PAIR).transpose(1, 0, 2)).ravel(), steps
 
 
 def _nearest(points: Floats, others: Floats) -> Floats:

@@ -9,13 +9,28 @@ import numpy as np
 
 from surface.base.arrays import Floats, Floats32, Ints, Shorts
 from surface.base.jit import inlined, kernel, nonallocating
-from surface.spline.lanes import add, fma_at, item, load, store3, zero
+from surface.spline.lanes import (
+    LANES,
+    add,
+    add_pairs,
+    first_of,
+    fma_at,
+    fma_pair,
+    item,
+    load,
+    load_pair,
+    second_of,
+    store3,
+    zero,
+    zero_pair,
+)
 
 # The cornea protrudes from the eyeball: its sphere's centre and radius, in eyeball radii, as
 # surface.fit.points.eyeball has it
 CORNEA_AT, CORNEA_RADIUS = 0.4447, 0.65
 MAX_SHORT = 32767  # the largest 16-bit number
 SHARE_STEP = 1.0 / MAX_SHORT  # shares of control points in samples are whole multiples of it: half the memory to read
+PAIR = 2 * LANES  # points that move at once
 MAX_SIGHT = 0.7  # tangent of 35 degrees: up to this far from the front, closed lips still look closed
 # coefficients of Taylor's series: of x**10 to 1, of the sine over x and of the cosine
 SINE = tuple((-1) ** k / factorial(2 * k + 1) for k in range(5, -1, -1))
@@ -23,36 +38,52 @@ COSINE = tuple((-1) ** k / factorial(2 * k) for k in range(5, -1, -1))
 
 
 @inlined
-def sum_rows(table, base, picks, first, end, by_pick, rows):  # type: ignore[no-untyped-def]
-    """Return sums of x, y and z of ``rows (k, 3)``, times eight weights each, over the entries ``first`` to ``end``.
+def sum_shares(share, ids, first, end, rows):  # type: ignore[no-untyped-def]
+    """Return sums of x, y and z over the entries ``first`` to ``end``: entry k is the row ``ids[k]`` of ``rows (k, 3)``
+    times the eight numbers of ``share`` from ``8 k`` on.
 
-    Entry k takes row ``picks[k]`` and the weights at ``base + 8 k``, or, if ``by_pick``, row k and the weights at
-    ``base + 8 picks[k]``. Four sums are kept of each, so that additions do not wait for each other.
+    Two entries are a pair, and two sums are kept of each, so that additions do not wait for each other.
     """
-    x0, y0, z0, x1, y1, z1 = zero(), zero(), zero(), zero(), zero(), zero()
-    x2, y2, z2, x3, y3, z3 = zero(), zero(), zero(), zero(), zero(), zero()
+    x, y, z = zero(), zero(), zero()
+    x0, y0, z0, x1, y1, z1 = zero_pair(), zero_pair(), zero_pair(), zero_pair(), zero_pair(), zero_pair()
     k = first
     while k + 4 <= end:
-        i, j, m, n = item(picks, k), item(picks, k + 1), item(picks, k + 2), item(picks, k + 3)
-        if by_pick:
-            a, b = load(table, base + 8 * i), load(table, base + 8 * j)
-            c, d = load(table, base + 8 * m), load(table, base + 8 * n)
-            i, j, m, n = k, k + 1, k + 2, k + 3
-        else:
-            a, b = load(table, base + 8 * k), load(table, base + 8 * k + 8)
-            c, d = load(table, base + 8 * k + 16), load(table, base + 8 * k + 24)
-        x0, y0, z0 = fma_at(a, rows, 3 * i, x0), fma_at(a, rows, 3 * i + 1, y0), fma_at(a, rows, 3 * i + 2, z0)
-        x1, y1, z1 = fma_at(b, rows, 3 * j, x1), fma_at(b, rows, 3 * j + 1, y1), fma_at(b, rows, 3 * j + 2, z1)
-        x2, y2, z2 = fma_at(c, rows, 3 * m, x2), fma_at(c, rows, 3 * m + 1, y2), fma_at(c, rows, 3 * m + 2, z2)
-        x3, y3, z3 = fma_at(d, rows, 3 * n, x3), fma_at(d, rows, 3 * n + 1, y3), fma_at(d, rows, 3 * n + 2, z3)
+        i, j, m, n = 3 * item(ids, k), 3 * item(ids, k + 1), 3 * item(ids, k + 2), 3 * item(ids, k + 3)
+        a, b = load_pair(share, 8 * k), load_pair(share, 8 * k + 16)
+        x0, x1 = fma_pair(a, rows, i, j, x0), fma_pair(b, rows, m, n, x1)
+        y0, y1 = fma_pair(a, rows, i + 1, j + 1, y0), fma_pair(b, rows, m + 1, n + 1, y1)
+        z0, z1 = fma_pair(a, rows, i + 2, j + 2, z0), fma_pair(b, rows, m + 2, n + 2, z1)
         k += 4
     while k < end:
-        i = item(picks, k)
-        a = load(table, base + 8 * (i if by_pick else k))
-        i = k if by_pick else i
-        x0, y0, z0 = fma_at(a, rows, 3 * i, x0), fma_at(a, rows, 3 * i + 1, y0), fma_at(a, rows, 3 * i + 2, z0)
+        a, i = load(share, 8 * k), 3 * item(ids, k)
+        x, y, z = fma_at(a, rows, i, x), fma_at(a, rows, i + 1, y), fma_at(a, rows, i + 2, z)
         k += 1
-    return add(add(x0, x1), add(x2, x3)), add(add(y0, y1), add(y2, y3)), add(add(z0, z1), add(z2, z3))
+    x0, y0, z0 = add_pairs(x0, x1), add_pairs(y0, y1), add_pairs(z0, z1)
+    return (
+        add(x, add(first_of(x0), second_of(x0))),
+        add(y, add(first_of(y0), second_of(y0))),
+        add(z, add(first_of(z0), second_of(z0))),
+    )
+
+
+@inlined
+def sum_ways(table, base, picks, count, ways):  # type: ignore[no-untyped-def]
+    """Return sums of x, y and z, a pair each, of ``ways (k, 3)``, way k times the sixteen numbers of ``table`` from
+    ``base + 16 picks[k]`` on."""
+    x0, y0, z0, x1, y1, z1 = zero_pair(), zero_pair(), zero_pair(), zero_pair(), zero_pair(), zero_pair()
+    k = 0
+    while k + 2 <= count:
+        a, b = load_pair(table, base + 16 * item(picks, k)), load_pair(table, base + 16 * item(picks, k + 1))
+        i = 3 * k
+        x0, x1 = fma_pair(a, ways, i, i, x0), fma_pair(b, ways, i + 3, i + 3, x1)
+        y0, y1 = fma_pair(a, ways, i + 1, i + 1, y0), fma_pair(b, ways, i + 4, i + 4, y1)
+        z0, z1 = fma_pair(a, ways, i + 2, i + 2, z0), fma_pair(b, ways, i + 5, i + 5, z1)
+        k += 2
+    if k < count:
+        a, i = load_pair(table, base + 16 * item(picks, k)), 3 * k
+        x0, y0 = fma_pair(a, ways, i, i, x0), fma_pair(a, ways, i + 1, i + 1, y0)
+        z0 = fma_pair(a, ways, i + 2, i + 2, z0)
+    return add_pairs(x0, x1), add_pairs(y0, y1), add_pairs(z0, z1)
 
 
 @nonallocating
@@ -63,14 +94,14 @@ def place_samples(
     ``local (k, 3)``, which are relative to that centre, too.
 
     Eight samples at a time: those of tile t are the sums of eight ``share`` each, in steps of :data:`SHARE_STEP`, times
-    the points ``ids`` between ``start[t]`` and ``start[t + 1]``; ``single (k, 3)`` and ``room (24,)`` are scratch
+    the points ``ids`` between ``start[t]`` and ``start[t + 1]``; ``single (k, 3)`` and ``room (48,)`` are scratch
     space. Depth is the distance from the centre if samples lie ``around`` an eyeball, else z.
     """
     for k in range(len(local)):
         for c in range(3):
             single[k, c] = SHARE_STEP * local[k, c]
     for tile in range(len(start) - 1):
-        x, y, z = sum_rows(share, 0, ids, start[tile], start[tile + 1], False, single)
+        x, y, z = sum_shares(share, ids, start[tile], start[tile + 1], single)
         store3(room, 0, x, y, z)
         for s in range(8 * tile, min(8 * tile + 8, len(out))):
             at = 3 * (s - 8 * tile)
@@ -291,8 +322,8 @@ def lift_points(
     """Move ``points (n, 3)`` with the numbers ``ids (k,)`` by ``lifts (s,)``, mm, each away from the eyeball's centre
     at its sample (s, 4).
 
-    ``table (8 b s,)`` says how far points move per lift, in each point's ``steps (k,)``: for every eight of them,
-    sample after sample. ``room (24,)`` is scratch space.
+    ``table (16 b s,)`` says how far points move per lift, in each point's ``steps (k,)``: for every sixteen of them,
+    sample after sample. ``room (48,)`` is scratch space.
     """
     ways, used, count = np.empty((len(lifts), 3), np.float32), np.empty(len(lifts), np.int64), 0
     for s in range(len(lifts)):
@@ -302,10 +333,11 @@ def lift_points(
                 ways[count, c] = share * samples[s, c]
             used[count] = s
             count += 1
-    for first in range(0, len(ids), 8):
-        x, y, z = sum_rows(table, first * len(lifts), used, 0, count, True, ways)
-        store3(room, 0, x, y, z)
-        for k in range(first, min(first + 8, len(ids))):
+    for first in range(0, len(ids), PAIR):
+        x, y, z = sum_ways(table, first * len(lifts), used, count, ways)
+        store3(room, 0, first_of(x), first_of(y), first_of(z))
+        store3(room, 24, second_of(x), second_of(y), second_of(z))
+        for k in range(first, min(first + PAIR, len(ids))):
             for c in range(3):
                 points[ids[k], c] += steps[k] * room[3 * (k - first) + c]
 

@@ -8,8 +8,11 @@ the kernels take are made by :mod:`.contact`:
     with indices into ``near``; own (k,) indices into ``near`` of the points that are moved
 ``limits`` : least, most, hold (s,) float64, radius and gain of :func:`.contact_kernels.find_lifts`; table and steps
     of :func:`.contact_kernels.lift_points`
-``work`` : local, found (p, 3) float64; single (p, 3), room (24,) float32; samples (s, 4), heights, lifts (s,) float64;
+``work`` : local, found (p, 3) float64; single (p, 3), room (48,) float32; samples (s, 4), heights, lifts (s,) float64;
     looked (4,) float64
+
+Python passes all of them as one table of addresses, see :mod:`surface.base.addresses`: what it passes to a compiled
+function is inspected at every call, and of so many arrays that would take as long as a quarter of the solution.
 """
 
 # mypy: disable-error-code="call-arg, var-annotated, no-untyped-def"
@@ -18,7 +21,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.jit import kernel, nonallocating
+from surface.base.addresses import flat, shaped
+from surface.base.addresses import rows as wide
+from surface.base.jit import kernel, merged, nonallocating
 
 from .contact_kernels import (
     find_closing,
@@ -31,6 +36,15 @@ from .contact_kernels import (
     trace_profiles,
 )
 
+NAMES = (
+    "near", "start", "ids", "share", "own", "least", "most", "hold", "table", "steps",
+    "local", "found", "single", "room", "samples", "heights", "lifts", "looked", "ball",
+)  # fmt: skip
+"""The arrays of a clearance in the order of its table; ``ball (5,)`` float64 is the eye's centre, its radius and the
+gain of lifts."""
+SIDES = ("before", "profiles", "overlap", "answer", "rest", "wanted", "apart", "push", "form")
+"""The arrays that follow in the table of a contact: its opening, as :func:`part_sides` takes it, and ``form (5,)``
+float64: ``press``, ``soft`` and ``rows`` there, then columns of a side and rows of a profile."""
 SEAL_PASSES = 2  # of bringing sides together: the second closes what bending left open
 
 
@@ -109,7 +123,7 @@ def put_back(points, near, own, eye, local):
 def part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, work):
     """Run one pass of :func:`part_sides` over the placed samples; return the largest error found.
 
-    Samples are placed again after it."""
+    Samples are placed again after it, and profiles of lids traced."""
     own, radius, local = sampling[4], limits[3], work[0]
     _, profiles, overlap, _, _, _ = opening
     error, around = 0.0, radius > 0.0
@@ -125,6 +139,8 @@ def part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, w
     if deepest > 0.0:
         move_points(own, overlap.ravel(), apart, np.zeros(3), radius, False, local)
         place_all(around, sampling, work)
+        if around:
+            trace_profiles(work[4], rows, radius, profiles)
     return max(error, deepest)
 
 
@@ -173,8 +189,7 @@ def part_sides(
         while done < passes and error >= tolerance:
             error = part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, work)
             done += 1
-        if radius > 0.0:
-            trace_profiles(work[4], rows, radius, profiles)
+        if radius > 0.0 and done > 0:
             tell_moves(before, profiles, push)
         for k in range(len(own)):
             for c in range(3):
@@ -195,3 +210,43 @@ def tell_moves(before, after, push):
                 for j in range(rows):
                     push[at] = after[side, k, j, kind] - before[side, k, j, kind]
                     at += 1
+
+
+@merged
+def clearance_of(table):
+    """Return the eye's centre, and ``sampling``, ``limits`` and ``work`` of a table."""
+    ball = flat(table, 18, np.float64)
+    sampling = (flat(table, 0, np.int64), flat(table, 1, np.int64), flat(table, 2, np.int64), flat(table, 3, np.int16),
+                flat(table, 4, np.int64))  # fmt: skip
+    limits = (flat(table, 5, np.float64), flat(table, 6, np.float64), flat(table, 7, np.float64), ball[3], ball[4],
+              flat(table, 8, np.int16), flat(table, 9, np.float64))  # fmt: skip
+    work = (wide(table, 10, 3, np.float64), wide(table, 11, 3, np.float64), wide(table, 12, 3, np.float32),
+            flat(table, 13, np.float32), wide(table, 14, 4, np.float64), flat(table, 15, np.float64),
+            flat(table, 16, np.float64), flat(table, 17, np.float64))  # fmt: skip
+    return ball[:3], sampling, limits, work
+
+
+@kernel
+def clear_bound(table, points, axis, passes, tolerance):
+    """Do what :func:`clear_eyeball` does with the arrays of a table of NAMES."""
+    eye, sampling, limits, work = clearance_of(table)
+    return clear_eyeball(points, eye, axis, passes, tolerance, sampling, limits, work)
+
+
+@kernel
+def part_bound(table, points, axis, seal, passes, tolerance):
+    """Do what :func:`part_sides` does with the arrays of a table of NAMES and SIDES."""
+    eye, sampling, limits, work = clearance_of(table)
+    first, form = len(NAMES), flat(table, len(NAMES) + 8, np.float64)
+    columns, deep, moved = np.int64(form[3]), np.int64(form[4]), len(sampling[4])
+    profiles, sides = (2, columns, deep, 3), (2, columns)
+    opening = (
+        shaped(table, first, profiles, np.float64), shaped(table, first + 1, profiles, np.float64),
+        shaped(table, first + 2, sides, np.float64), wide(table, first + 3, 3, np.float64),
+        shaped(table, first + 4, sides, np.float64), shaped(table, first + 5, sides, np.float64),
+    )  # fmt: skip
+    apart = shaped(table, first + 6, (2 * columns, moved), np.float64)
+    return part_sides(
+        points, eye, axis, seal, passes, tolerance, form[0], form[1], np.int64(form[2]), apart, opening,
+        flat(table, first + 7, np.float64), sampling, limits, work,
+    )  # fmt: skip

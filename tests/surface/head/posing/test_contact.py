@@ -183,10 +183,10 @@ def test_limits_hold_what_rests_near_and_free_what_rests_far() -> None:
         assert loose[:2] == (least, most) and loose[2][0] == 0.0  # may lift off, and sinks as little
 
 
-def test_tables_lie_in_memory_eight_points_at_a_time() -> None:
-    table = np.random.default_rng(2).normal(size=(5, 11)) * np.logspace(-3, 1, 11)
+def test_tables_lie_in_memory_sixteen_points_at_a_time() -> None:
+    table = np.random.default_rng(2).normal(size=(5, 19)) * np.logspace(-3, 1, 19)
     packed, steps = by_lanes(table)
-    first, second = packed.reshape(2, 5, 8)
+    first, second = packed.reshape(2, 5, 16)
     again = np.hstack([first, second[:, :3]]) * steps
     assert (np.abs(again - table) <= 0.51 * steps).all() and np.allclose(32767 * steps, np.abs(table).max(axis=0))
     assert not second[:, 3:].any()

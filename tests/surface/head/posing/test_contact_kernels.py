@@ -40,7 +40,7 @@ def samples_at(points: np.ndarray) -> np.ndarray:
     start, ids, share = np.arange(len(points) + 1), np.arange(len(points)), np.zeros(8 * len(points), np.int16)
     share[::8] = 32767
     out, single = np.empty((8 * len(points), 4)), np.empty((len(points), 3), np.float32)
-    place_samples(start, ids, share, points, True, single, np.empty(24, np.float32), out)
+    place_samples(start, ids, share, points, True, single, np.empty(48, np.float32), out)
     return np.ascontiguousarray(out[::8])
 
 
@@ -87,7 +87,7 @@ def test_a_lift_goes_away_from_the_eyeball_where_its_sample_stands():
     way = directions(60)[:21]
     points, rest, lifts = np.zeros((23, 3)), samples_at(13.0 * way), np.linspace(-0.5, 0.5, 21)
     table = np.random.default_rng(3).uniform(0, 1, (21, 19))  # three tiles of points, the last one not full
-    lift_points(np.arange(19) + 1, lifts, rest, *by_lanes(table), np.empty(24, np.float32), points)
+    lift_points(np.arange(19) + 1, lifts, rest, *by_lanes(table), np.empty(48, np.float32), points)
     np.testing.assert_allclose(points[1:20], (lifts[:, None] * table).T @ way, atol=1e-4)
     assert not points[0].any() and not points[20:].any() and lifts[10] == 0.0
 
@@ -253,7 +253,7 @@ def test_samples_are_sums_of_points_by_tiles_of_eight(around):
     packed = rng.integers(0, 32768, (3, 8)).astype(np.int16)
     share = packed / 32767
     out, single = np.empty((11, 4)), np.empty((4, 3), np.float32)
-    place_samples(start, ids, packed.ravel(), local, around, single, np.empty(24, np.float32), out)
+    place_samples(start, ids, packed.ravel(), local, around, single, np.empty(48, np.float32), out)
     sums = np.concatenate([share[:2].T @ local[[1, 3]], np.outer(share[2], local[0])])[:11]
     np.testing.assert_allclose(out[:, :3], sums, rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(out[:, 3], np.linalg.norm(sums, axis=1) if around else sums[:, 2], rtol=1e-4, atol=1e-4)

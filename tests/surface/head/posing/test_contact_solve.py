@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from surface.deform.lists import LANES
 from surface.head.posing import contact_solve as module
 from surface.head.posing.contact import by_lanes, tile_weights
 
@@ -32,7 +31,7 @@ class Samples:
         identity = np.eye(s)[:, self.own]
         self.sampling = self.near, *tile_weights(np.arange(s + 1), np.arange(s), np.ones(s)), self.own
         self.limits = (*(np.full(s, x) for x in (least, most, hold)), radius, gain, *by_lanes(identity))
-        single, room = np.zeros((s, 3), np.float32), np.zeros(3 * LANES, np.float32)
+        single, room = np.zeros((s, 3), np.float32), np.zeros(48, np.float32)
         self.work = (np.zeros((s, 3)), np.full((s, 3), np.nan), single, room, np.zeros((s, 4)), np.zeros(s),
                      np.zeros(s), np.zeros(4))  # fmt: skip
 
