@@ -35,6 +35,7 @@ from surface.fit.points.facets import facet_sag
 from surface.fit.points.importance import POINTS_PER_EYE as MORE_POINTS
 from surface.fit.points.importance import with_importance
 from surface.fit.points.lid_seating import close_lips, seat_lids
+from surface.fit.points.local import localised
 from surface.fit.points.recipe import PartRecipe, Recipe, in_place, recipe_for
 from surface.fit.points.refine import fit_chart
 from surface.fit.points.report import RMS_MM, Errors, FitReport, FitResult, FittedPart, PartReport, measure
@@ -157,6 +158,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
+    head = localised(head, scale)
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
     head = with_greatest_error(head, str(dense.greatest) if dense.greatest else "")
     notes = [*worn.notes, *loaded.notes, *plan.notes, *turned_faces(mesh), *mended]
