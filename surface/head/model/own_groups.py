@@ -48,6 +48,7 @@ class OwnAmounts:
         own = tuple(dict.fromkeys(group.name for group in groups))
         self.names = NAMES + own
         self._value = np.array([self.names.index(group.name) for group in groups], np.intp)
+        self._none = np.zeros(0)
         self._times = [(i, self._at(group, name)) for i, group in enumerate(groups) for name in group.times]
 
     def _at(self, group: OwnGroup, name: str) -> int:
@@ -58,6 +59,8 @@ class OwnAmounts:
     def __call__(self, values: Floats) -> Floats:
         """Return (g,): amounts for values (P,) in the order of ``names``. Raises ValueError: one of them is not a
         number."""
+        if not len(self._value):
+            return self._none
         amounts: Floats = values[self._value]
         if np.isnan(amounts).any():
             raise ValueError(f"values: {self.names[self._value[int(np.argmax(np.isnan(amounts)))]]} is not a number")

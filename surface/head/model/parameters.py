@@ -7,7 +7,7 @@ added; it turns the eyeball and moves the lids.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import atan2, cos, hypot, sin
+from math import atan2, cos, hypot, isnan, sin
 from typing import Any
 
 import numpy as np
@@ -30,10 +30,10 @@ ANGLES = ("headYaw", "headPitch", "headRoll", "leftEyeYaw", "leftEyePitch", "rig
 NAMES = SHAPES + ANGLES
 HEAD_RAD = np.radians([60.0, 40.0, 30.0])  # yaw, pitch, roll at full scale
 EYE_RAD = np.radians([35.0, 30.0])  # yaw, pitch at full scale
+_HEAD, _EYE_AT = HEAD_RAD.tolist(), EYE_RAD.tolist()
 _AT = {name: i for i, name in enumerate(NAMES)}
 _LOOK = [[_AT[f"eyeLook{d}{s}"] for d in ("Down", "In", "Out", "Up")] for s in SIDES]
 _BLINK = [_AT[f"eyeBlink{s}"] for s in SIDES]
-_LOOK_DOWN = [_AT[f"eyeLookDown{s}"] for s in SIDES]
 _OPENERS = [[_AT[f"eye{e}{s}"] for e in ("LookUp", "Wide")] for s in SIDES]
 _JAW, _CLOSE, _TONGUE = _AT["jawOpen"], _AT["mouthClose"], _AT["tongueOut"]
 _BELOW = [_AT[n] for n in ("mouthRollLower", "mouthShrugLower", "mouthPressLeft", "mouthPressRight")]
@@ -43,6 +43,9 @@ TONGUE_JAW = 0.33  # minimum jawOpen for the whole tongue
 TONGUE_JAW_LEAD = 1.7  # how much earlier the jaw opens than the tongue comes out
 LID_SHARE = 0.72  # fraction of a blink by which the upper lid goes down at a full look down
 _LOW = np.array([0.0] * len(SHAPES) + [-1.0] * len(ANGLES))
+_NO_LIP, _NO_LAG, _NO_OWN = np.zeros((0, 3)), np.zeros(3), np.zeros(0)
+for _nothing in (_NO_LIP, _NO_LAG, _NO_OWN):
+    _nothing.flags.writeable = False  # poses share them
 
 
 @dataclass
@@ -66,9 +69,9 @@ class Pose:
     head: Floats
     gaze: Floats
     pushes: dict[str, Floats] = field(default_factory=dict)
-    lip: Floats = field(default_factory=lambda: np.zeros((0, 3)))
-    lag: Floats = field(default_factory=lambda: np.zeros(3))
-    own: Floats = field(default_factory=lambda: np.zeros(0))
+    lip: Floats = field(default_factory=lambda: _NO_LIP)
+    lag: Floats = field(default_factory=lambda: _NO_LAG)
+    own: Floats = field(default_factory=lambda: _NO_OWN)
     found: dict[tuple[object, ...], Any] = field(default_factory=dict, init=False, compare=False)
 
 
@@ -90,28 +93,42 @@ def read_pose(values: Floats) -> Pose:
     v = np.asarray(values, float)
     if v.shape != (len(NAMES),):
         raise ValueError(f"values has shape {v.shape}, expected ({len(NAMES)},)")
-    if np.isnan(v).any():
-        raise ValueError(f"values: {NAMES[int(np.argmax(np.isnan(v)))]} is not a number")
     given = np.minimum(np.maximum(v, _LOW), 1.0).tolist()
+    if isnan(sum(given)):
+        raise ValueError(f"values: {NAMES[int(np.argmax(np.isnan(v)))]} is not a number")
     shapes, angle = given[: len(SHAPES)], given[len(SHAPES) :]
-    needed = TONGUE_JAW * min(1.0, TONGUE_JAW_LEAD * shapes[_TONGUE])
+    needed = 0.0
+    if shapes[_TONGUE]:
+        needed = TONGUE_JAW * min(1.0, TONGUE_JAW_LEAD * shapes[_TONGUE])
+        yielded = 1.0 - LIP_YIELD * min(1.0, shapes[_TONGUE] / LIP_YIELD_AT)
+        for i in _BELOW:  # the lower lip gives way to the tongue
+            shapes[i] *= yielded
     jaw = shapes[_JAW] = max(shapes[_JAW], needed)
-    given = 1.0 - LIP_YIELD * min(1.0, shapes[_TONGUE] / LIP_YIELD_AT)
-    for i in _BELOW:  # the lower lip gives way to the tongue
-        shapes[i] *= given
-    gaze = [_gaze([shapes[i] for i in _LOOK[side]], side, *angle[3 + 2 * side : 5 + 2 * side]) for side in (0, 1)]
-    for side, (yaw, pitch) in enumerate(gaze):
-        outward = yaw * (1 - 2 * side)
-        looks = max(pitch, 0.0), max(-outward, 0.0), max(outward, 0.0), max(-pitch, 0.0)
-        for i, amount in zip(_LOOK[side], looks, strict=True):
-            shapes[i] = amount
-        down = _LOOK_DOWN[side]
-        shapes[down] = lid_down(shapes[down], shapes[_BLINK[side]])
-        for i in _OPENERS[side]:  # a closing lid ends closed, wherever it started
-            shapes[i] *= 1.0 - shapes[_BLINK[side]]
+    gaze = _turn_eye(shapes, 0, angle[3], angle[4]), _turn_eye(shapes, 1, angle[5], angle[6])
     shapes[_CLOSE] = min(shapes[_CLOSE], jaw - needed)
     closed = shapes[_CLOSE] / jaw if jaw > 0 else 0.0
-    return Pose(np.array(shapes), jaw, closed, np.array(angle[:3]) * HEAD_RAD, np.array(gaze) * EYE_RAD)
+    (yaw, pitch, roll), (x, y) = _HEAD, _EYE_AT
+    head = np.array([angle[0] * yaw, angle[1] * pitch, angle[2] * roll])
+    (left, down), (right, low) = gaze
+    return Pose(np.array(shapes), jaw, closed, head, np.array([[left * x, down * y], [right * x, low * y]]))
+
+
+def _turn_eye(shapes: list[float], side: int, yaw: float, pitch: float) -> tuple[float, float]:
+    """Return the yaw and pitch of one eye, -1..1, from its angles and its eyeLook shapes together; the shapes of its
+    lids follow in ``shapes``."""
+    down, inward, outward, up = _LOOK[side]
+    blink = shapes[_BLINK[side]]
+    if yaw or pitch or shapes[down] or shapes[inward] or shapes[outward] or shapes[up]:
+        to_side = (shapes[outward] - shapes[inward]) * (1 - 2 * side)
+        yaw = min(max(yaw + to_side, -1.0), 1.0)
+        pitch = min(max(pitch + shapes[down] - shapes[up], -1.0), 1.0)
+        away = yaw * (1 - 2 * side)
+        shapes[down], shapes[inward] = lid_down(max(pitch, 0.0), blink), max(-away, 0.0)
+        shapes[outward], shapes[up] = max(away, 0.0), max(-pitch, 0.0)
+    if blink:
+        for i in _OPENERS[side]:  # a closing lid ends closed, wherever it started
+            shapes[i] *= 1.0 - blink
+    return yaw, pitch
 
 
 def lid_down(look: float, blink: float) -> float:
@@ -126,13 +143,6 @@ def lid_down(look: float, blink: float) -> float:
     width, apart = blink * (1.0 - blink), abs(LID_SHARE * look - blink)
     smooth = max(width - apart, 0.0) ** 2 / (4.0 * width) if width > 0.0 else 0.0
     return (max(LID_SHARE * look - blink, 0.0) + smooth) / LID_SHARE
-
-
-def _gaze(look: list[float], side: int, yaw: float, pitch: float) -> tuple[float, float]:
-    """Return the yaw and pitch of one eye, -1..1: its angles and its eyeLook shapes (down, in, out, up) together."""
-    down, inward, outward, up = look
-    yaw, pitch = yaw + (outward - inward) * (1 - 2 * side), pitch + down - up
-    return min(max(yaw, -1.0), 1.0), min(max(pitch, -1.0), 1.0)
 
 
 def smoothstep(x: Floats, low: float = 0.0, high: float = 1.0) -> Floats:
