@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.base.errors import HeadFileError
+from surface.base.jit import nonallocating
 from surface.head.model.data import Rule, Seal
 from surface.head.model.parameters import SHAPES, SIDES
 
@@ -19,8 +20,8 @@ class Drivers:
     def __init__(self, rules: list[Rule], where: str = "head") -> None:
         self.names = (*SHAPES, *(r.group for r in rules))
         terms = [(i, term) for i, rule in enumerate(rules) for term in rule.terms]
-        self._mix = np.zeros((len(terms), len(SHAPES)))
-        for row, (i, term) in zip(self._mix, terms, strict=True):
+        mix = np.zeros((len(terms), len(SHAPES)))
+        for row, (i, term) in zip(mix, terms, strict=True):
             for name, share in term.items():
                 if name not in SHAPES:
                     raise HeadFileError(
@@ -28,8 +29,11 @@ class Drivers:
                         hint="names are ARKit's, as omote render --sheet -o sheet.png shows them",
                     )
                 row[SHAPES.index(name)] = share
-        self._first = np.cumsum([0, *(len(r.terms) for r in rules)])[:-1]
         self._power = np.array([r.power for r in rules])
+        first = np.cumsum([0, *(len(r.terms) for r in rules)])
+        rows, shape = np.nonzero(mix)
+        start = np.searchsorted(rows, np.arange(len(mix) + 1))
+        self._terms = first.astype(np.int64), start.astype(np.int64), shape, mix[rows, shape], self._power
         self._amounts = np.zeros(len(self.names))
         self._of: Floats | None = None
 
@@ -41,9 +45,25 @@ class Drivers:
         self._of = shapes
         self._amounts[: len(SHAPES)] = shapes
         if len(self._power):
-            terms = np.minimum(np.maximum(self._mix @ shapes, 0.0), 1.0)
-            self._amounts[len(SHAPES) :] = np.multiply.reduceat(terms, self._first) ** self._power
+            multiply_terms(shapes, *self._terms, self._amounts)
         return self._amounts
+
+
+@nonallocating
+def multiply_terms(
+    shapes: Floats, first: Ints, start: Ints, shape: Ints, share: Floats, power: Floats, out: Floats
+) -> None:  # fmt: skip
+    """Write the amounts of rules behind those of the shapes (s,) in ``out (s + r,)``: of rule r the product of terms
+    ``first[r]`` to ``first[r + 1]``, limited to 0..1, to its ``power``. Term t adds up ``share`` of each ``shape`` from
+    ``start[t]`` to ``start[t + 1]``."""
+    for r in range(len(power)):
+        amount = 1.0
+        for t in range(first[r], first[r + 1]):
+            term = 0.0
+            for e in range(start[t], start[t + 1]):
+                term += share[e] * shapes[shape[e]]
+            amount *= min(max(term, 0.0), 1.0)
+        out[len(shapes) + r] = amount if power[r] == 1.0 else amount ** power[r]
 
 
 class SealDriver:

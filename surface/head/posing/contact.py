@@ -25,7 +25,7 @@ from surface.head.posing.contact_kernels import (
     SHARE_STEP,
     find_gaps,
     find_heights,
-    follow_samples,
+    follow_bound,
     move_points,
     trace_profiles,
 )
@@ -199,10 +199,13 @@ class Follower:
             row = np.linalg.norm(own[left : left + 2] - points[i], axis=2).argmin(axis=1) % self._rows
             self._beside[k] = (side[i] * columns + np.array([left, left + 1])) * self._rows + row
             self._share[k] = near[i] * share[i] * np.array([1 - x + left, x - left])
+        ball = np.array([*self.eye, self.radius, self._size])
+        self._arrays = {"ids": self.ids, "beside": self._beside, "share": self._share, "ball": ball}
+        self._bound = make_table(self._arrays)
 
     def apply(self, push: Floats, points: Floats) -> None:
         """Add what :meth:`ContactSolver.apply` returned to control points (n, 3)."""
-        follow_samples(self.ids, self._beside, self._share, push, self._size, self.eye, self.radius, points)
+        follow_bound(self._bound, push, points)
 
 
 def close_nearly(gaps: Floats, firm: Floats) -> None:

@@ -7,6 +7,8 @@ from math import factorial
 
 import numpy as np
 
+from surface.base.addresses import flat
+from surface.base.addresses import rows as wide
 from surface.base.arrays import Floats, Floats32, Ints, Shorts
 from surface.base.jit import inlined, kernel, nonallocating
 from surface.spline.lanes import (
@@ -406,3 +408,14 @@ def follow_samples(
             move = share[k, 0] * a + share[k, 1] * b
             if move != 0.0:
                 move_up(ids[k], move, eye, radius, kind == 1, points)
+
+
+@kernel
+def follow_bound(table: Ints, push: Floats, points: Floats) -> None:
+    """Run :func:`follow_samples` with a table of addresses: of ``ids``, ``beside``, ``share``, and of five numbers, the
+    eye's centre, its radius and ``size``."""
+    ball = flat(table, 3, np.float64)
+    follow_samples(
+        flat(table, 0, np.int64), wide(table, 1, 2, np.int64), wide(table, 2, 2, np.float64), push, np.int64(ball[4]),
+        ball[:3], ball[3], points,
+    )  # fmt: skip

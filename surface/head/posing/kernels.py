@@ -7,6 +7,8 @@ import math
 
 import numpy as np
 
+from surface.base.addresses import flat, shaped
+from surface.base.addresses import rows as wide
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.base.jit import inlined, kernel, nonallocating
 from surface.spline.lanes import (
@@ -32,9 +34,10 @@ AHEAD = 512  # numbers that are fetched before they are needed
 
 @nonallocating
 def add_moves(
-    amounts: Floats, start: Ints, tile: Ints, rows: Floats32, order: Ints, sums: Floats32, points: Floats
+    amounts: Floats, start: Ints, tile: Ints, rows: Floats32, order: Ints, sums: Floats32, rest: Floats, points: Floats
 ) -> None:
-    """Add to ``points (n, 3)`` the displacements of groups, each by its one of ``amounts (g,)``.
+    """Write to ``points (n, 3)`` those at ``rest (n, 3)`` and the displacements of groups, each by its one of ``amounts
+    (g,)``.
 
     Group g moves the tiles ``tile[start[g]]`` to ``tile[start[g + 1] - 1]`` by 24 numbers each in ``rows``, those of
     eight points. Points are put into tiles by ``order (n,)``; ``sums (24 t,)`` is scratch space.
@@ -54,7 +57,7 @@ def add_moves(
     for k in range(order.shape[0]):
         i = order[k]
         for c in range(3):
-            points[i, c] += sums[3 * k + c]
+            points[i, c] = rest[i, c] + sums[3 * k + c]
 
 
 @nonallocating
@@ -191,6 +194,23 @@ def keep_on_eyeball(ids: Ints, eye: Floats, hold: Floats, radius: Floats, points
         points[i, 2] += scale * z
 
 
+@kernel
+def hold_lids(table: Ints, given: Floats, points: Floats) -> None:
+    """Set the distance of the lids among ``points (n, 3)`` for ``given (g,)`` amounts of groups, by :func:`mix_rows`
+    and :func:`keep_on_eyeball`.
+
+    table : addresses of used, the (h,) groups that change distances, moves (h, k) float32, rest, least and radius (k,),
+        ids (k,), eye (k, 3), hold (k,), and room (h,) for amounts.
+    """
+    used, rest, ids = flat(table, 0, np.int64), flat(table, 2, np.float64), flat(table, 5, np.int64)
+    moves, amounts = shaped(table, 1, (len(used), len(ids)), np.float32), flat(table, 8, np.float64)
+    radius = flat(table, 4, np.float64)
+    for g in range(len(used)):
+        amounts[g] = given[used[g]]
+    mix_rows(amounts, moves, rest, flat(table, 3, np.float64), radius)
+    keep_on_eyeball(ids, wide(table, 6, 3, np.float64), flat(table, 7, np.float64), radius, points)
+
+
 @nonallocating
 def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at: Floats) -> None:
     """For every point of ``uv (m, 2)``: its distance from the polyline ``line (k, 2)``, and how far along it the
@@ -229,3 +249,13 @@ def stitch_border(
             scale = 1.0 / np.sqrt(square)
             for c in range(3):
                 to_normals[i, c] *= scale
+
+
+@kernel
+def stitch_bound(table: Ints) -> None:
+    """Run :func:`stitch_border` with arrays of which the table has the addresses, in its order."""
+    stitch_border(
+        wide(table, 0, 3, np.float32), wide(table, 1, 3, np.float32), wide(table, 2, 3, np.float32),
+        wide(table, 3, 3, np.float32), flat(table, 4, np.int64), flat(table, 5, np.int64), flat(table, 6, np.int64),
+        flat(table, 7, np.float32),
+    )  # fmt: skip

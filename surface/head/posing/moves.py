@@ -44,10 +44,10 @@ class Moves:
         """Bytes that a pose reads where every group moves."""
         return self._rows.nbytes + self._tile.nbytes
 
-    def add(self, amounts: Floats, points: Floats) -> None:
-        """Add the displacements by ``amounts (g,)`` of the groups to ``points (n, 3)``, contiguous; displacements are
-        summed in 32-bit numbers."""
-        add_moves(amounts, self._start, self._tile, self._rows, self._order, self._sums, points)
+    def add(self, amounts: Floats, rest: Floats, points: Floats) -> None:
+        """Write ``rest (n, 3)`` and the displacements by ``amounts (g,)`` of the groups to ``points (n, 3)``, both
+        contiguous; displacements are summed in 32-bit numbers."""
+        add_moves(amounts, self._start, self._tile, self._rows, self._order, self._sums, rest, points)
 
     def add_all(self, amounts: Floats, points: Floats) -> Floats:
         """Return (h, n, 3): ``points (n, 3)`` with displacements by each of ``amounts (h, g)``: one product of

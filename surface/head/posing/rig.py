@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import cos, sin
 
 import numpy as np
 
+from surface.base.addresses import make_table
 from surface.base.arrays import Floats
 from surface.head.model.data import HeadData, Jaw, PartData
 from surface.head.model.meshes import domain_of, make_surface
@@ -14,7 +16,7 @@ from surface.head.model.parameters import SHAPES, Pose, rotation
 from surface.head.model.rules import Drivers, SealDriver
 from surface.head.model.sway import SWAYS
 from surface.head.posing.contact import FORWARD, LID_MM, ContactSolver, EyeballClearance, Follower
-from surface.head.posing.kernels import keep_on_eyeball, mix_rows, swing_jaw
+from surface.head.posing.kernels import hold_lids, swing_jaw
 from surface.head.posing.moves import Moves
 from surface.head.posing.tongue import tongue_rest
 
@@ -155,12 +157,13 @@ class SkinRig:
 
     def _evaluate(self, pose: Pose, moved: Floats | None) -> None:
         """Groups, jaw, lids and contacts, one after the other."""
-        np.copyto(self.points, self.rest if moved is None else moved)
         if moved is None:
-            self._moves.add(self._amounts, self.points)
+            self._moves.add(self._amounts, self.rest, self.points)
             self._add_own(pose, self.points)
+        else:
+            np.copyto(self.points, moved)
         if len(self._sways.used) and pose.lag.any():
-            self._sways.add(pose.lag[self._sways.used], self.points)
+            self._sways.add(pose.lag[self._sways.used], self.points, self.points)
         if pose.jaw > 0 and self._swings:
             turn, shift = _path_of(pose, self._jaw)
             full_turn, full_shift = self._whole
@@ -225,27 +228,29 @@ class Lids:
     """Keeps the lids of one part, its points with ``lids``, at their distance from the eyeballs while they slide."""
 
     def __init__(self, part: PartData, head: HeadData, moves: Moves) -> None:
-        self._ids = np.flatnonzero(part.lids).astype(np.int64)
-        self._hold = np.abs(part.lids[self._ids])
-        self._eye = head.eyes[(part.lids[self._ids] < 0).astype(int)]
-        from_eye = part.points[self._ids] - self._eye
-        self._rest = np.linalg.norm(from_eye, axis=1)
-        away = np.linalg.norm(from_eye + moves.at(self._ids), axis=2) - self._rest
-        self._used = np.flatnonzero(away.any(axis=1))
-        self._moves = away[self._used].astype(np.float32)
-        self._radius = self._rest.copy()
-        self._least = np.minimum(self._rest, head.eye_radius + LID_MM)
+        self._ids = ids = np.flatnonzero(part.lids).astype(np.int64)
+        eye = np.ascontiguousarray(head.eyes[(part.lids[ids] < 0).astype(int)], np.float64)
+        from_eye = part.points[ids] - eye
+        rest = np.linalg.norm(from_eye, axis=1)
+        away = np.linalg.norm(from_eye + moves.at(ids), axis=2) - rest
+        used = np.flatnonzero(away.any(axis=1))
+        arrays = {
+            "used": used, "moves": away[used].astype(np.float32), "rest": rest,
+            "least": np.minimum(rest, head.eye_radius + LID_MM), "radius": rest.copy(), "ids": ids, "eye": eye,
+            "hold": np.abs(part.lids[ids]).astype(np.float64), "amounts": np.zeros(len(used)),
+        }  # fmt: skip
+        self._kept, self._table = arrays, make_table(arrays)
 
     def apply(self, amounts: Floats, points: Floats) -> None:
         """Set the distance of the lids' points among ``points (n, 3)``; ``amounts (g,)`` of the groups."""
         if len(self._ids):
-            mix_rows(amounts[self._used], self._moves, self._rest, self._least, self._radius)
-            keep_on_eyeball(self._ids, self._eye, self._hold, self._radius, points)
+            hold_lids(self._table, amounts, points)
 
 
 def optical_axis(gaze: Floats) -> Floats:
     """Return (3,): unit vector along which an eye looks, from yaw and pitch (2,), rad."""
-    return np.ascontiguousarray(rotation(*gaze)[:, 2])
+    yaw, pitch = gaze
+    return np.array([sin(yaw) * cos(pitch), -sin(pitch), cos(yaw) * cos(pitch)])  # the third column of `rotation`
 
 
 def _axis_of(pose: Pose, eye: int) -> Floats:

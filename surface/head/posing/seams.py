@@ -6,14 +6,18 @@ fill the gaps between vertices that only the first part has and the edges of the
 
 from __future__ import annotations
 
+from operator import is_
+
 import numpy as np
 
+from surface.base.addresses import make_table
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.head.model.data import Seam
-from surface.head.posing.kernels import nearest_on_line, stitch_border
+from surface.head.posing.kernels import nearest_on_line, stitch_border, stitch_bound
 from surface.head.posing.part import HeadPart
 
 NEAR = 2e-3  # in (u, v): vertices nearer than this to the seam's polyline are on it
+ARRAYS = ("vertices", "normals", "second vertices", "second normals")
 SAME = 1e-4  # along the seam, in points of its polyline: vertices nearer than this coincide
 
 
@@ -26,6 +30,7 @@ class SeamStitch:
 
     def __init__(self, seam: Seam, first: HeadPart, second: HeadPart) -> None:
         self.first, self.second = first, second
+        self._bound: tuple[Floats32, ...] = (np.zeros((0, 3), np.float32),) * len(ARRAYS)
         a_ids, a_at = _vertices_around(*_vertices_along(first, seam.uv_a), seam.uv_a)
         b_ids, b_at = _vertices_along(second, seam.uv_b)
         inside = (b_at >= a_at.min(initial=np.inf) - SAME) & (b_at <= a_at.max(initial=-np.inf) + SAME)
@@ -66,9 +71,15 @@ class SeamStitch:
     def close(self) -> None:
         """Put the second part's border onto the first one's, if either has changed."""
         one, two = self.first, self.second
-        if len(self.ids) and (one.changed or two.changed):
-            self.join(one.vertices, one.normals, two.vertices, two.normals)
-            two.touch()
+        if not len(self.ids) or not (one.changed or two.changed):
+            return
+        arrays = one.vertices, one.normals, two.vertices, two.normals
+        if not all(map(is_, arrays, self._bound)):  # seams add vertices to parts
+            lines = {"ids": self.ids, "low": self.low, "high": self.high, "share": self.share}
+            self._table = make_table(dict(zip(ARRAYS, arrays, strict=True)) | lines)
+            self._bound = arrays
+        stitch_bound(self._table)
+        two.touch()
 
     def join(self, vertices: Floats32, normals: Floats32, second_vertices: Floats32, second_normals: Floats32) -> None:
         """Put the border among the second part's vertices (m, 3) onto that among the first one's (k, 3)."""

@@ -30,11 +30,12 @@ def test_tiles_of_moves_are_added_by_the_amounts_of_their_groups(rng: np.random.
     tiles = np.zeros((2, 8, 3))
     tiles += -2.0 * rows[:2]
     tiles[1] += 0.5 * rows[2]
-    want = points.copy()
+    rest, want = points.copy(), points.copy()
     want[order] += tiles.reshape(-1, 3)[:10]
-    sums = np.full(48, 9.0, np.float32)
-    add_moves(np.array([-2.0, 1.0, 0.5]), start, tile, rows.ravel(), order, sums, points)
-    np.testing.assert_allclose(points, want, atol=1e-6)
+    sums, out = np.full(48, 9.0, np.float32), np.full((10, 3), np.nan)
+    add_moves(np.array([-2.0, 1.0, 0.5]), start, tile, rows.ravel(), order, sums, points, out)
+    np.testing.assert_allclose(out, want, atol=1e-6)
+    np.testing.assert_array_equal(points, rest)
 
 
 def test_rows_are_mixed_and_kept_above_the_least(rng: np.random.Generator) -> None:

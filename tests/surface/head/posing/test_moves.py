@@ -22,7 +22,7 @@ def test_sparse_is_dense() -> None:
     )
     np.testing.assert_array_equal(moves.used, [0, 1])
     points = np.ones((25, 3))
-    moves.add(np.array([0.5, 2.0]), points)
+    moves.add(np.array([0.5, 2.0]), points, points)
     want = np.ones((25, 3))
     want[:, 2] += 3.0
     want[[3, 7]] += 2.0 * np.array([[1, 2, 3], [4, 5, 6]])
@@ -39,7 +39,7 @@ def test_displacements_of_many_poses_at_once_are_those_of_each() -> None:
     for pose, points, values in zip(wanted, single, amounts, strict=True):
         for group, value in zip(groups, values, strict=True):
             pose[group.ids] += value * group.moves.astype(np.float64)
-        moves.add(values, points)
+        moves.add(values, points, points)
     np.testing.assert_allclose(moves.add_all(amounts, rest), wanted, atol=1e-12)
     np.testing.assert_allclose(single, wanted, atol=2e-6)  # summed in 32-bit numbers
     assert moves.add_all(amounts[:0], rest).shape == (0, *rest.shape)
@@ -49,7 +49,7 @@ def test_a_point_that_is_named_twice_moves_by_both() -> None:
     ids = np.array([24, 1, 3, 1], np.int32)
     moves = Moves(part("a", 0, groups=[Group("cheekPuff", ids, np.arange(12, dtype=np.float32).reshape(4, 3))]), NAMED)
     points = np.zeros((25, 3))
-    moves.add(np.array([2.0]), points)
+    moves.add(np.array([2.0]), points, points)
     want = np.zeros((25, 3))
     want[[24, 3]], want[1] = [[0, 2, 4], [12, 14, 16]], [24, 28, 32]
     np.testing.assert_array_equal(points, want)
@@ -58,7 +58,7 @@ def test_a_point_that_is_named_twice_moves_by_both() -> None:
 
 def test_a_part_without_groups_stays() -> None:
     moves, points = Moves(part("a", 0), NAMED), np.ones((25, 3))
-    moves.add(np.zeros(0), points)
+    moves.add(np.zeros(0), points, points)
     assert (points == 1.0).all() and moves.nbytes == 0
 
 
