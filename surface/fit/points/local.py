@@ -18,10 +18,10 @@ from surface.dcp import DCPSurface
 from surface.head.model.data import Contact, Group, HeadData, PartData
 from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.head.model.parameters import SHAPES, smoothstep
-from surface.head.posing.contact import weights_at
+from surface.head.posing.contact import lip_weights, weights_at
 
 STILL_MM, MOVED_MM = 0.02, 0.06  # skin that a shape moves less stays; from the second on it moves as before
-OFF_MM = 0.08  # groups that would be off by more than that somewhere stay as they are
+OFF_MM = 0.09  # groups that would be off by more than that somewhere stay as they are
 QUIET_MM = 0.05  # shapes that move the samples of a contact less leave it alone
 MIN_SHARES = 0.02, 0.005, 0.0  # of a point's weights, in skin that moves: with less it stays; tried one by one
 FULL_SHARE = 0.999  # with more it moves as before
@@ -54,9 +54,9 @@ def _local_part(part: PartData, head: HeadData, contacts: Sequence[Contact], sca
 def _near(surface: DCPSurface, contact: Contact) -> tuple[csc_matrix, Bools]:
     """Weights (s, n) of the samples of a contact, and which control points (n,) they depend on."""
     places = contact.places.reshape(-1, 2)
-    start, ids, share = weights_at(surface, places)
-    rows = np.repeat(np.arange(len(places)), np.diff(start))
-    weights = csc_matrix((share, (rows, ids)), shape=(len(places), surface.n))
+    start, ids, share = weights_at(surface, places) if contact.eye >= 0 else lip_weights(contact, surface)[:3]
+    rows = np.repeat(np.arange(len(start) - 1), np.diff(start))
+    weights = csc_matrix((share, (rows, ids)), shape=(len(start) - 1, surface.n))
     return weights, np.asarray(weights.getnnz(axis=0) > 0)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from hashlib import blake2b
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,6 +34,7 @@ from surface.head.posing.contact_solve import NAMES, SIDES, clear_bound, gather_
 from surface.spline.kernels import fill_rows, row_capacity
 
 CONTACT_SHARE = 2 / 3  # fraction of the rows at an opening that can touch the other side; in the rest corrections fade
+INNER_SHARE = 0.8  # of these rows at lips
 SOFT_MM = 0.1
 OVERLAP_MM = (0.28, 0.9)  # allowed overlap of lips and of lids: triangles cut about that off the edges of both sides
 NEARLY_MM = 1.2  # lips nearer than this at rest count as closed
@@ -69,6 +71,16 @@ def height_limits(
     return np.minimum(most, LID_MM if held else TOUCH_MM), most, hold
 
 
+class SampleWeights(NamedTuple):
+    """How samples depend on control points: sample k is the sum of ``share (m,)`` times the points ``ids (m,)`` from
+    ``start[k]`` to ``start[k + 1]``, and ``offset[k]`` of (s, 3)."""
+
+    start: Ints
+    ids: Ints
+    share: Floats
+    offset: Floats
+
+
 class EyeballClearance:
     """Keeps a surface out of an eyeball, or on it where it is ``held``.
 
@@ -76,6 +88,7 @@ class EyeballClearance:
     ----------
     places : (s, 2) samples in (u, v) of the surface near the eyeball; eye (3,), radius : the eyeball; with radius 0
         there is none, and only samples are placed.
+    seen : samples that are placed, if not all of them; what moves is chosen by all.
 
     Attributes
     ----------
@@ -85,14 +98,19 @@ class EyeballClearance:
     """
 
     def __init__(
-        self, surface: DCPSurface, places: Floats, eye: Floats, radius: float, *, held: bool = False, cling: bool = True
+        self, surface: DCPSurface, places: Floats, eye: Floats, radius: float, *, held: bool = False,
+        cling: bool = True, seen: SampleWeights | None = None,
     ) -> None:  # fmt: skip
         self.eye, self.radius = np.ascontiguousarray(eye, np.float64), float(radius)
         start, ids, share = weights_at(surface, places)
         self.ids, self.table = _inverse(start, ids, share, surface.points, REGULARISATION[radius > 0])
-        near, local = np.unique(ids, return_inverse=True)
-        self.sampling = near, *tile_weights(start, local, share), np.searchsorted(near, self.ids)
-        self.samples, (s, p) = np.empty((len(places), 4)), (len(places), len(near))
+        placed = seen or SampleWeights(start, ids, share, np.zeros((len(places), 3)))
+        near = np.union1d(placed.ids, self.ids)
+        watched = np.searchsorted(near, np.unique(placed.ids if seen else near))
+        tiles = tile_weights(placed.start, np.searchsorted(near, placed.ids), placed.share)
+        self.sampling = near, *tiles, np.searchsorted(near, self.ids), watched, placed.offset
+        s, p = len(placed.offset), len(near)
+        self.samples = np.empty((s, 4))
         self.work = (np.zeros((p, 3)), np.full((p, 3), np.nan), np.zeros((p, 3), np.float32),
                      np.zeros(3 * PAIR, np.float32), self.samples, np.zeros(s), np.zeros(s), np.zeros(4))  # fmt: skip
         gather_near(surface.points, near, self.eye, self.work[0])
@@ -120,10 +138,11 @@ class ContactSolver:
     def __init__(self, contact: Contact, surface: DCPSurface, head: HeadData) -> None:
         self.contact, self.passes = contact, 0
         places, eye = contact.places.reshape(-1, 2), eye_of(contact, head)
-        self._sides = EyeballClearance(surface, places, *eye, held=True, cling=contact.cling)
-        lids = self._sides.radius > 0
+        lids = eye[1] > 0
+        seen = None if lids else lip_weights(contact, surface)
+        self._sides = EyeballClearance(surface, places, *eye, held=True, cling=contact.cling, seen=seen)
         self._apart = _column_moves(contact).T @ self._sides.table
-        columns, rows = contact.places.shape[1:3]
+        columns, rows = contact.places.shape[1], contact.places.shape[2] if lids else contact_rows(contact)
         profiles = 2, columns, contact_rows(contact), 3
         self._opening = (np.zeros(profiles), np.zeros(profiles), np.zeros((2, columns)),
                          np.zeros((len(self._sides.ids), 3)), *np.zeros((2, 2, columns)))  # fmt: skip
@@ -161,8 +180,7 @@ class ContactSolver:
     def lower(self) -> Floats:
         """(k, 3) samples of the lower side that can touch the upper one, as the last call of :meth:`apply` left them;
         for lips."""
-        columns, rows = self.contact.places.shape[1:3]
-        samples = self._sides.samples.reshape(2, columns, rows, 4)[1, :, : contact_rows(self.contact), :3]
+        samples = self._sides.samples.reshape(2, -1, 4)[1, :, :3]
         return samples.reshape(-1, 3)
 
     def move_sides(self, amounts: Floats, points: Floats) -> None:
@@ -248,6 +266,28 @@ def weights_at(surface: DCPSurface, uv: Floats) -> tuple[Ints, Ints, Floats]:
     rows, share, ids = rows[counts], share[counts], ids[:used][counts]
     start = np.searchsorted(rows, np.arange(len(uv) + 1))
     return start, ids.astype(np.int64) % surface.n, share / np.bincount(rows, share, len(uv))[rows]
+
+
+def lip_weights(contact: Contact, surface: DCPSurface) -> SampleWeights:
+    """Return how samples of lips that can touch depend on control points.
+
+    The outermost rows, :data:`INNER_SHARE` of them, take only points that the others take, so that shapes of brows and
+    cheeks leave all of these alone. At rest they lie where all points put them.
+    """
+    rows = contact_rows(contact)
+    places = contact.places[:, :, :rows].reshape(-1, 2)
+    start, ids, share = weights_at(surface, places)
+    sample = np.repeat(np.arange(len(places)), np.diff(start))
+    inner = np.unique(ids[sample % rows < round(INNER_SHARE * rows)])
+    kept = np.isin(ids, inner)
+    kept |= ~np.isin(sample, sample[kept])  # a sample without any of them takes all
+    less = np.where(kept, share, 0.0)
+    less /= np.bincount(sample, less, len(places))[sample]
+    moves = (share - less)[:, None] * surface.points[ids]
+    offset = np.zeros((len(places), 3))
+    np.add.at(offset, sample, moves)
+    start = np.searchsorted(sample[kept], np.arange(len(places) + 1))
+    return SampleWeights(start, ids[kept], less[kept], offset)
 
 
 def tile_weights(start: Ints, ids: Ints, share: Floats) -> tuple[Ints, Ints, Shorts]:

@@ -90,14 +90,16 @@ def sum_ways(table, base, picks, count, ways):  # type: ignore[no-untyped-def]
 
 @nonallocating
 def place_samples(
-    start: Ints, ids: Ints, share: Shorts, local: Floats, around: bool, single: Floats32, room: Floats32, out: Floats
+    start: Ints, ids: Ints, share: Shorts, offset: Floats, local: Floats, around: bool, single: Floats32,
+    room: Floats32, out: Floats,
 ) -> None:  # fmt: skip
     """Samples ``out (s, 4)`` of a surface: x, y and z from the eyeball's centre, and depth, from control points
     ``local (k, 3)``, which are relative to that centre, too.
 
     Eight samples at a time: those of tile t are the sums of eight ``share`` each, in steps of :data:`SHARE_STEP`, times
-    the points ``ids`` between ``start[t]`` and ``start[t + 1]``; ``single (k, 3)`` and ``room (48,)`` are scratch
-    space. Depth is the distance from the centre if samples lie ``around`` an eyeball, else z.
+    the points ``ids`` between ``start[t]`` and ``start[t + 1]``, and of ``offset (s, 3)``; ``single (k, 3)`` and
+    ``room (48,)`` are scratch space. Depth is the distance from the centre if samples lie ``around`` an eyeball, else
+    z.
     """
     for k in range(len(local)):
         for c in range(3):
@@ -107,7 +109,7 @@ def place_samples(
         store3(room, 0, x, y, z)
         for s in range(8 * tile, min(8 * tile + 8, len(out))):
             at = 3 * (s - 8 * tile)
-            a, b, c = room[at], room[at + 1], room[at + 2]
+            a, b, c = room[at] + offset[s, 0], room[at + 1] + offset[s, 1], room[at + 2] + offset[s, 2]
             out[s, 0], out[s, 1], out[s, 2] = a, b, c
             out[s, 3] = np.sqrt(a * a + b * b + c * c) if around else c
 

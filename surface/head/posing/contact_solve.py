@@ -4,8 +4,10 @@ sides parted, as often as it takes.
 Everything happens on a copy of the control points near the opening, relative to the eyeball's centre. The tuples that
 the kernels take are made by :mod:`.contact`:
 
-``sampling`` : near (p,) control points of the samples; start, ids, share as :func:`.contact.tile_weights` gives them,
-    with indices into ``near``; own (k,) indices into ``near`` of the points that are moved
+``sampling`` : near (p,) control points of the samples, and those that are moved; start, ids, share as
+    :func:`.contact.tile_weights` gives them, with indices into ``near``; own (k,) and watched (w,) indices into
+    ``near`` of the points that are moved, and of those that the answer depends on; offset (s, 3) float64, added to each
+    sample
 ``limits`` : least, most, hold (s,) float64, radius and gain of :func:`.contact_kernels.find_lifts`; table and steps
     of :func:`.contact_kernels.lift_points`
 ``work`` : local, found (p, 3) float64; single (p, 3), room (48,) float32; samples (s, 4), heights, lifts (s,) float64;
@@ -37,7 +39,7 @@ from .contact_kernels import (
 )
 
 NAMES = (
-    "near", "start", "ids", "share", "own", "least", "most", "hold", "table", "steps",
+    "near", "start", "ids", "share", "own", "watched", "offset", "least", "most", "hold", "table", "steps",
     "local", "found", "single", "room", "samples", "heights", "lifts", "looked", "ball",
 )  # fmt: skip
 """The arrays of a clearance in the order of its table; ``ball (5,)`` float64 is the eye's centre, its radius and the
@@ -57,14 +59,15 @@ def gather_near(points, near, eye, local):
 
 
 @nonallocating
-def is_known(local, axis, seal, found, looked):
-    """Whether points, axis and seal are those of the last answer; they are kept as those of the next one if not."""
+def is_known(watched, local, axis, seal, found, looked):
+    """Whether the ``watched`` points, axis and seal are those of the last answer; they are kept as those of the next
+    one if not."""
     same = looked[3] == seal
     looked[3] = seal
     for c in range(3):
         same = same and looked[c] == axis[c]
         looked[c] = axis[c]
-    for k in range(len(local)):
+    for k in watched:
         for c in range(3):
             same = same and found[k, c] == local[k, c]
             found[k, c] = local[k, c]
@@ -75,7 +78,7 @@ def is_known(local, axis, seal, found, looked):
 def lift_once(axis, tolerance, sampling, limits, work):
     """Move points once where the placed samples are off the eyeball by more than ``tolerance``, mm; returns the largest
     error."""
-    _, _, _, _, own = sampling
+    own = sampling[4]
     least, most, hold, radius, gain, table, steps = limits
     local, _, _, room, samples, heights, lifts, _ = work
     find_heights(samples, radius, axis, heights)
@@ -88,16 +91,16 @@ def lift_once(axis, tolerance, sampling, limits, work):
 @nonallocating
 def place_all(around, sampling, work):
     """Place the samples."""
-    _, start, ids, share, _ = sampling
+    _, start, ids, share, _, _, offset = sampling
     local, _, single, room, samples, _, _, _ = work
-    place_samples(start, ids, share, local, around, single, room, samples)
+    place_samples(start, ids, share, offset, local, around, single, room, samples)
 
 
 @kernel
 def clear_eyeball(points, eye, axis, passes, tolerance, sampling, limits, work):
     """Move control points (n, 3), at most ``passes`` times, until no sample is off the eyeball by more than
     ``tolerance``, mm; returns the largest error that was found last."""
-    near, _, _, _, own = sampling
+    near, own = sampling[0], sampling[4]
     local, moved, error = work[0], False, 0.0
     gather_near(points, near, eye, local)
     for _ in range(passes):
@@ -169,16 +172,16 @@ def part_sides(
 
     press, soft : as in :func:`.contact_kernels.find_overlap`; rows : samples of a column.
     apart : (2 c, k) how far the moved points go up where the sides of a column part by 1.
-    opening : before, profiles (2, c, m, 3), overlap (2, c), the answer (k, 3), gaps at rest (2, c), and room for
-        those that are wanted (2, c); all but those at rest are overwritten.
+    opening : before, profiles (2, c, m, 3), overlap (2, c), the answer (k, 3), see :func:`answer_with`, gaps at rest
+        (2, c), and room for those that are wanted (2, c); all but those at rest are overwritten.
     push : what :meth:`.contact.ContactSolver.apply` returns.
     """
-    near, _, _, _, own = sampling
+    near, _, _, _, own, watched, _ = sampling
     local, found, looked, radius = work[0], work[1], work[7], limits[3]
     before, profiles, _, answer, _, _ = opening
     gather_near(points, near, eye, local)
     done = 0
-    if not is_known(local, axis, seal, found, looked):
+    if not is_known(watched, local, axis, seal, found, looked):
         push[:] = 0.0
         place_all(radius > 0.0, sampling, work)
         if seal > 0.0 and radius <= 0.0:
@@ -191,12 +194,26 @@ def part_sides(
             done += 1
         if radius > 0.0 and done > 0:
             tell_moves(before, profiles, push)
-        for k in range(len(own)):
-            for c in range(3):
-                answer[k, c] = eye[c] + local[own[k], c]
+        answer_with(radius > 0.0, own, eye, local, push, apart, answer)
     for k in range(len(own)):
-        points[near[own[k]]] = answer[k]
+        if radius > 0.0:
+            points[near[own[k]]] = answer[k]
+        else:  # lips go straight up and down, wherever their points are
+            points[near[own[k]], 1] += answer[k, 1]
     return done
+
+
+@nonallocating
+def answer_with(around, own, eye, local, push, apart, answer):
+    """Write the places of moved points to ``answer (k, 3)``, or, of lips, how far they go up."""
+    for k in range(len(own)):
+        for c in range(3):
+            answer[k, c] = eye[c] + local[own[k], c] if around else 0.0
+    if not around:
+        for s in range(len(push)):
+            if push[s] != 0.0:
+                for k in range(len(own)):
+                    answer[k, 1] += push[s] * apart[s, k]
 
 
 @nonallocating
@@ -215,14 +232,14 @@ def tell_moves(before, after, push):
 @merged
 def clearance_of(table):
     """Return the eye's centre, and ``sampling``, ``limits`` and ``work`` of a table."""
-    ball = flat(table, 18, np.float64)
+    ball = flat(table, 20, np.float64)
     sampling = (flat(table, 0, np.int64), flat(table, 1, np.int64), flat(table, 2, np.int64), flat(table, 3, np.int16),
-                flat(table, 4, np.int64))  # fmt: skip
-    limits = (flat(table, 5, np.float64), flat(table, 6, np.float64), flat(table, 7, np.float64), ball[3], ball[4],
-              flat(table, 8, np.int16), flat(table, 9, np.float64))  # fmt: skip
-    work = (wide(table, 10, 3, np.float64), wide(table, 11, 3, np.float64), wide(table, 12, 3, np.float32),
-            flat(table, 13, np.float32), wide(table, 14, 4, np.float64), flat(table, 15, np.float64),
-            flat(table, 16, np.float64), flat(table, 17, np.float64))  # fmt: skip
+                flat(table, 4, np.int64), flat(table, 5, np.int64), wide(table, 6, 3, np.float64))  # fmt: skip
+    limits = (flat(table, 7, np.float64), flat(table, 8, np.float64), flat(table, 9, np.float64), ball[3], ball[4],
+              flat(table, 10, np.int16), flat(table, 11, np.float64))  # fmt: skip
+    work = (wide(table, 12, 3, np.float64), wide(table, 13, 3, np.float64), wide(table, 14, 3, np.float32),
+            flat(table, 15, np.float32), wide(table, 16, 4, np.float64), flat(table, 17, np.float64),
+            flat(table, 18, np.float64), flat(table, 19, np.float64))  # fmt: skip
     return ball[:3], sampling, limits, work
 
 

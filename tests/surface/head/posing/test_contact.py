@@ -15,6 +15,7 @@ from surface.head.posing.contact import (
     CONTACT_SHARE,
     HIDDEN_MM,
     HOLD_MM,
+    INNER_SHARE,
     LID_MM,
     OVERLAP_MM,
     SOFT_MM,
@@ -26,6 +27,7 @@ from surface.head.posing.contact import (
     contact_rows,
     corner_fade,
     height_limits,
+    lip_weights,
     tile_weights,
     weights_at,
 )
@@ -454,3 +456,45 @@ def test_what_was_found_for_the_same_surface_is_used_again_and_for_another_found
     for overlap in np.linspace(1.0, 2.0, 20):
         EyeballClearance(lips(overlap), low_places(), np.zeros(3), 0.0)
     assert len(contact_module._FOUND) == contact_module._MAX_CACHED
+
+
+def test_outer_rows_of_lips_take_points_of_the_inner_ones_and_lie_where_all_put_them() -> None:
+    surface, given = lips(0.5), contact()
+    found = lip_weights(given, surface)
+    rows = contact_rows(given)
+    places = given.places[:, :, :rows].reshape(-1, 2)
+    start, ids, share = weights_at(surface, places)
+    inner = np.arange(rows) < round(INNER_SHARE * rows)
+    assert 0 < inner.sum() < rows
+    dense, all_of = (np.zeros((len(places), surface.n)) for _ in range(2))
+    np.add.at(all_of, (np.repeat(np.arange(len(places)), np.diff(start)), ids), share)
+    np.add.at(dense, (np.repeat(np.arange(len(places)), np.diff(found.start)), found.ids), found.share)
+    within = np.tile(inner, 2 * COLUMNS)
+    used = all_of[within].any(axis=0)
+    assert not dense[:, ~used].any() and all_of[:, ~used].any()
+    np.testing.assert_allclose(dense.sum(axis=1), 1.0)
+    np.testing.assert_allclose(dense[within], all_of[within], atol=1e-12)
+    np.testing.assert_allclose(dense @ surface.points + found.offset, all_of @ surface.points, atol=1e-9)
+    assert np.abs(found.offset[within]).max() < 1e-9 < np.abs(found.offset[~within]).max()
+
+
+def test_lips_are_not_solved_again_for_points_that_their_samples_do_not_depend_on() -> None:
+    """What is moved goes up as much as before, wherever it is now."""
+    surface = lips(0.5)
+    head = replace(small_head(), parts=[replace(small_head().parts[0], points=surface.points)])
+    solver = ContactSolver(contact(), surface, head)
+    seen = np.unique(lip_weights(contact(), surface).ids)
+    other = np.setdiff1d(solver._sides.ids, seen)
+    assert len(other)
+    first = surface.points.copy()
+    solver.apply(AHEAD, first)
+    assert solver.passes > 0
+    moved = surface.points.copy()
+    moved[other] += [1.0, 2.0, 3.0]
+    again = moved.copy()
+    solver.apply(AHEAD, again)
+    assert solver.passes == 0 and np.abs(first - surface.points).max() > 0.1
+    np.testing.assert_allclose(again - moved, first - surface.points, atol=1e-12)
+    fresh = moved.copy()
+    ContactSolver(contact(), surface, head).apply(AHEAD, fresh)
+    assert np.array_equal(fresh, again)  # to the bit

@@ -40,7 +40,7 @@ def samples_at(points: np.ndarray) -> np.ndarray:
     start, ids, share = np.arange(len(points) + 1), np.arange(len(points)), np.zeros(8 * len(points), np.int16)
     share[::8] = 32767
     out, single = np.empty((8 * len(points), 4)), np.empty((len(points), 3), np.float32)
-    place_samples(start, ids, share, points, True, single, np.empty(48, np.float32), out)
+    place_samples(start, ids, share, np.zeros((len(out), 3)), points, True, single, np.empty(48, np.float32), out)
     return np.ascontiguousarray(out[::8])
 
 
@@ -252,9 +252,9 @@ def test_samples_are_sums_of_points_by_tiles_of_eight(around):
     start, ids = np.array([0, 2, 3]), np.array([1, 3, 0])
     packed = rng.integers(0, 32768, (3, 8)).astype(np.int16)
     share = packed / 32767
-    out, single = np.empty((11, 4)), np.empty((4, 3), np.float32)
-    place_samples(start, ids, packed.ravel(), local, around, single, np.empty(48, np.float32), out)
-    sums = np.concatenate([share[:2].T @ local[[1, 3]], np.outer(share[2], local[0])])[:11]
+    out, single, offset = np.empty((11, 4)), np.empty((4, 3), np.float32), rng.normal(size=(11, 3))
+    place_samples(start, ids, packed.ravel(), offset, local, around, single, np.empty(48, np.float32), out)
+    sums = np.concatenate([share[:2].T @ local[[1, 3]], np.outer(share[2], local[0])])[:11] + offset
     np.testing.assert_allclose(out[:, :3], sums, rtol=1e-4, atol=1e-4)
     np.testing.assert_allclose(out[:, 3], np.linalg.norm(sums, axis=1) if around else sums[:, 2], rtol=1e-4, atol=1e-4)
 

@@ -29,7 +29,8 @@ class Samples:
         self.points[self.near] = places + self.eye
         self.own = np.arange(s) if own is None else own
         identity = np.eye(s)[:, self.own]
-        self.sampling = self.near, *tile_weights(np.arange(s + 1), np.arange(s), np.ones(s)), self.own
+        tiles = tile_weights(np.arange(s + 1), np.arange(s), np.ones(s))
+        self.sampling = self.near, *tiles, self.own, np.arange(s), np.zeros((s, 3))
         self.limits = (*(np.full(s, x) for x in (least, most, hold)), radius, gain, *by_lanes(identity))
         single, room = np.zeros((s, 3), np.float32), np.zeros(48, np.float32)
         self.work = (np.zeros((s, 3)), np.full((s, 3), np.nan), single, room, np.zeros((s, 4)), np.zeros(s),
@@ -241,23 +242,25 @@ def test_moves_of_samples_are_said_kind_by_kind_side_by_side() -> None:
 
 
 def test_points_and_axis_and_seal_are_compared_and_kept() -> None:
-    local, axis = np.random.default_rng(5).normal(size=(4, 3)), np.array([0.0, 0.6, 0.8])
-    found, looked = np.full((4, 3), np.nan), np.zeros(4)
-    assert not module.is_known(local, axis, 0.5, found, looked)
-    np.testing.assert_array_equal(found, local)
+    local, axis, watched = np.random.default_rng(5).normal(size=(5, 3)), np.array([0.0, 0.6, 0.8]), np.arange(4)
+    found, looked = np.full((5, 3), np.nan), np.zeros(4)
+    assert not module.is_known(watched, local, axis, 0.5, found, looked)
+    np.testing.assert_array_equal(found[:4], local[:4])
     assert looked.tolist() == [0.0, 0.6, 0.8, 0.5]
-    assert module.is_known(local, axis, 0.5, found, looked)
+    assert module.is_known(watched, local, axis, 0.5, found, looked)
     for k in range(4):
         for c in range(3):
             other = local.copy()
             other[k, c] += 1e-12
-            assert not module.is_known(other, axis, 0.5, found, looked)
-            assert not module.is_known(local, axis, 0.5, found, looked)
-    assert not module.is_known(local, axis, 0.25, found, looked) and looked[3] == 0.25
+            assert not module.is_known(watched, other, axis, 0.5, found, looked)
+            assert not module.is_known(watched, local, axis, 0.5, found, looked)
+    local[4] += 1.0  # a point that nobody watches
+    assert module.is_known(watched, local, axis, 0.5, found, looked)
+    assert not module.is_known(watched, local, axis, 0.25, found, looked) and looked[3] == 0.25
     for c in range(3):
         turned = axis.copy()
         turned[c] += 0.1
-        assert not module.is_known(local, turned, 0.25, found, looked)
+        assert not module.is_known(watched, local, turned, 0.25, found, looked)
 
 
 def test_points_near_an_opening_are_copied_from_the_eye_s_centre_and_the_moved_ones_put_back() -> None:
