@@ -1,3 +1,5 @@
+#define PORES_DULL 5.0
+
 uniform sampler2D detail;
 uniform float detail_strength;
 
@@ -81,7 +83,9 @@ void main() {
 #ifdef LIPS
     lit *= lips();
 #endif
-    lit += key_colour * (wide * v_normal_wide.w + narrow * v_half_narrow.w);
+    // Pores do not shine, and the skin between them does, the more so the narrower the highlight.
+    float smooth_skin = max(0.0, 1.0 + PORES_DULL * grain.w);
+    lit += key_colour * (wide * v_normal_wide.w + narrow * v_half_narrow.w) * smooth_skin;
 #ifdef FRECKLES
     lit *= mix(vec3(1.0), vec3(0.76, 0.62, 0.52), freckle());
 #endif

@@ -25,7 +25,7 @@ void main() {
     float narrow = wide * wide;
     narrow *= narrow;
     float sun = reaching(around, key_at_rest);
-    float shine = highlight(normal, v) * albedo_occlusion.a * sun * (WIDE * wide + NARROW * narrow * surface_uv_gloss.z);
+    float shine = highlight(normal, v) * albedo_occlusion.a * sun * surface_uv_gloss.z * (WIDE * wide + NARROW * narrow);
     vec3 lit = diffuse(normal, v, albedo, albedo_occlusion.a, sun, reaching(around, rim_at_rest), surface_uv_gloss.w);
     lit += shine * key_colour;
 #ifdef PANELS
