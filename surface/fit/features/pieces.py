@@ -159,7 +159,7 @@ def skin_part(part: PartRecipe, chart: Chart, fitted: Fitted, rig: HeadRig) -> P
         groups += tongue_groups(fitted.points, rig.tongue, rig.jaw)
     slits = np.array([[c.v, c.start, c.end] for c in chart.cuts]).reshape(-1, 3)
     return PartData(
-        part.name, part.material, part.follows, fitted.points, np.ones(n),
+        part.name, part.material, part.follows, fitted.points + (0.0, part.raised, 0.0), np.ones(n),
         fitted.net.knots_u, fitted.net.knots_v, np.full((n, 2), 3), chart.loops, slits, part.budget, groups, share,
         _lid_share(part, fitted, rig) if skin and rig.radius > 0 else np.zeros(n),
     )  # fmt: skip

@@ -84,7 +84,7 @@ def test_moves_are_the_least_squares_ones_for_a_trough_with_a_ridge_on_either_si
     x = np.linspace(-2.5, 2.5, 11)  # in widths
     trough = np.exp(-2.0 * x**2) - RIDGE * np.exp(-2.0 * (np.abs(x) - 1.3) ** 2)
     t = np.minimum(np.linspace(0, 1, 9), np.linspace(1, 0, 9)) / TAPER
-    ends = 0.15 + 0.85 * np.where(t < 1, t**2 * (3 - 2 * t), 1.0)
+    ends = np.where(t < 1, t**2 * (3 - 2 * t), 1.0)
     places = np.stack(
         [np.broadcast_to(f.uv[:, 0], (11, 9)), 0.5 + np.broadcast_to(x[:, None], (11, 9)) * 6.0 / HIGH], -1
     )
