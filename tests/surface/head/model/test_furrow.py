@@ -7,7 +7,17 @@ import pytest
 
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
-from surface.head.model.furrow import REGULARISATION, RIDGE, SPAN, TAPER, Furrow, even_moves, furrow_knots, furrow_moves
+from surface.head.model.furrow import (
+    NEAR_TAPER,
+    REGULARISATION,
+    RIDGE,
+    SPAN,
+    TAPER,
+    Furrow,
+    even_moves,
+    furrow_knots,
+    furrow_moves,
+)
 from surface.head.model.light import WEIGHT
 
 WIDE, HIGH = 100.0, 80.0
@@ -109,10 +119,10 @@ def test_points_near_each_other_sink_the_line_evenly_by_the_depth() -> None:
     moves = even_moves(f, surface, ids)
     u = np.linspace(0.3, 0.7, 201)
     found = sunk(surface, ids, moves, np.column_stack([u, np.full(201, 0.5)]))
-    middle = np.abs(u - 0.5) < 0.2 - TAPER * 0.4
+    middle = np.abs(u - 0.5) < 0.2 - NEAR_TAPER * 0.4
     np.testing.assert_allclose(found[middle], -1.5, atol=0.12)
     assert np.abs(np.diff(found[middle], 2)).max() < 0.01  # nothing ripples
     assert found[0] == pytest.approx(0.0, abs=0.15) and found[-1] == pytest.approx(found[0], abs=1e-6)
-    share = (u[:60] - 0.3) / 0.4 / TAPER
+    share = (u[:60] - 0.3) / 0.4 / NEAR_TAPER
     wanted = -1.5 * np.clip(share, 0, 1) ** 2 * (3 - 2 * np.clip(share, 0, 1))
     np.testing.assert_allclose(found[:60], wanted, atol=0.2)
