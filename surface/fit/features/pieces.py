@@ -35,6 +35,7 @@ LASHES, LOWER_LASHES = 24, 14
 BESIDE = 0.15  # in radii of an eyeball: so near to their own surface half the control points that keep to it have to be
 BENT = 0.04  # in radii: more than this a strip that keeps to an eyeball may not lie beside a shape that was fitted
 BROW_MM = (4.2, 4.6)  # how far a brow reaches below and above its line
+UP = np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -159,7 +160,7 @@ def skin_part(part: PartRecipe, chart: Chart, fitted: Fitted, rig: HeadRig) -> P
         groups += tongue_groups(fitted.points, rig.tongue, rig.jaw)
     slits = np.array([[c.v, c.start, c.end] for c in chart.cuts]).reshape(-1, 3)
     return PartData(
-        part.name, part.material, part.follows, fitted.points, np.ones(n),
+        part.name, part.material, part.follows, fitted.points + part.raised * UP, np.ones(n),
         fitted.net.knots_u, fitted.net.knots_v, np.full((n, 2), 3), chart.loops, slits, part.budget, groups, share,
         _lid_share(part, fitted, rig) if skin and rig.radius > 0 else np.zeros(n),
     )  # fmt: skip

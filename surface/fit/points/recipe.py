@@ -28,7 +28,8 @@ class PartRecipe:
     """One part: its vertices as ranges, what it looks like, what it follows, how finely it is fitted.
 
     ``tiled`` : its islands are still to be put into tiles of their own; ``wrapped`` : one skin goes round all of them;
-    ``downweight_slivers`` : its faces may be of any form and size; see :func:`surface.fit.source.chart.make_chart`.
+    ``downweight_slivers`` : its faces may be of any form and size; see :func:`surface.fit.source.chart.make_chart`;
+    ``raised`` : how far it is moved upwards after the fit, mm.
     """
 
     name: str
@@ -40,6 +41,7 @@ class PartRecipe:
     tiled: bool = False
     wrapped: bool = False
     downweight_slivers: bool = False
+    raised: float = 0.0
 
     def holds(self, vertex: float) -> bool:
         """Is the vertex in one of the ranges?"""

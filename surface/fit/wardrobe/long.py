@@ -16,15 +16,19 @@ PART_X = 14.0  # of the parting, mm
 AT_PARTING = 0.22  # share of the hair's thickness at the parting: roots lie in a shallow valley, not beside a slot
 APART_MM = 0.05  # of either side's roots from the parting's middle: more would be a slot with the cap's edge in it
 ALONG_PART, FANNED = 25, 12  # guides that begin along the parting, and at its end behind
-TIPS_Y = -124.0  # mm
+TIPS_Y, SHORTER_MM = (
+    -122.0,
+    24.0,
+)  # mm: where it ends at the sides, and by how much it is shorter behind, clear of the back
 OVER_EAR_MM = 11.0
 _LEVELLED = 2.5, 1.5, 0.0  # guides and places along them, over which those that hang are levelled
 _HANGS_Y = 55.0, 95.0  # mm: where they hang, and where they do not yet
 _WAVE_MM, _WAVE_DEEP_MM = 88.0, 3.4  # how long waves of hair that hangs are, and how far they go at most
 _TURNS_IN_MM = 30.0, 9.0  # of its end, that turns in, and by how much
+RAGGED_MM = 2.5  # by how much locks differ in length: more is a hem torn, not cut
 FRAYED = 0.09, 0.0  # of the width, at the face and behind
 LAYERS = (
-    Layer(1.07, 0.46, 1.0, 45.0, 0.1), Layer(1.0, 0.66, 0.92, 30.0, 0.1), Layer(0.88, 1.6, 0.74, 16.0),
+    Layer(1.07, 0.46, 1.0, 34.0, 0.1), Layer(1.0, 0.66, 0.92, 22.0, 0.1), Layer(0.88, 1.6, 0.74, 10.0),
 )  # fmt: skip
 
 
@@ -121,13 +125,13 @@ def _curtain(skin: Skin, line: Hairline, side: float) -> list[Patches]:
         return np.asarray(1.0 + 24.0 * step(-at[:, 1], -25.0, 10.0))
 
     def cut(at: Floats) -> Floats:
-        return np.asarray(at[:, 1] - TIPS_Y - 14.0 * step(-at[:, 2], 10.0, 60.0))
+        return np.asarray(at[:, 1] - TIPS_Y - SHORTER_MM * step(-at[:, 2], -10.0, 60.0))
 
     order = slice(None) if side < 0.0 else slice(None, None, -1)  # so that the outside is outside
     fan, back = fan[order], back[order]
     length = np.full(len(roots), 430.0)
     comb = Comb(
-        roots[order], length, thickness, flow, cut, 7.0, 1.0, steps=72, stiff=0.6, slack=slack, ears=True,
+        roots[order], length, thickness, flow, cut, RAGGED_MM, 1.0, steps=72, stiff=0.6, slack=slack, ears=True,
         drape=lambda paths: _waved(_hung(paths, side), side),
     )  # fmt: skip
     return sheets(

@@ -15,7 +15,8 @@ from surface.dcp import DCPSurface
 from surface.head.model.parameters import smoothstep
 
 SPAN = 0.62  # of knots across a line, in widths of the furrow; along it spans are the distances of the points
-TAPER = 0.3  # fraction of a line's length over which the depth fades at each end
+TAPER = 0.45  # fraction of a line's length over which the depth fades at each end, of points far apart
+NEAR_TAPER = 0.3  # and of points near each other
 REGULARISATION = 0.03  # weight of zero moves, relative to that of an average point's samples
 EVENNESS = 1.0  # weight of second differences along a line of near points, relative to an average one's sample
 RIDGE = 0.35  # height of the ridges along both sides of a furrow, in its depths
@@ -48,7 +49,7 @@ def furrow_moves(f: Furrow, surface: DCPSurface, ids: Ints) -> Floats:
     surface : with the points.
     """
     normal, su, sv = _normals(f, surface)
-    ends = _taper(f)
+    ends = _taper(f, TAPER)
     x = np.linspace(-2.5, 2.5, 11)[:, None]  # across, in widths
     profile = np.exp(-0.5 * (x / 0.5) ** 2) - RIDGE * np.exp(-0.5 * ((np.abs(x) - 1.3) / 0.5) ** 2)
     samples = f.uv + (x * f.width)[..., None] * _sideways_step(f, su, sv)
@@ -67,7 +68,7 @@ def even_moves(f: Furrow, surface: DCPSurface, ids: Ints) -> Floats:
     bends = np.diff(np.eye(len(ids)), 2, axis=0)
     normal_matrix = matrix.T @ matrix
     normal_matrix += EVENNESS * np.trace(normal_matrix) / len(ids) * bends.T @ bends
-    amount = np.linalg.solve(normal_matrix, matrix.T @ (-f.depth * _taper(f, least=0.0)))
+    amount = np.linalg.solve(normal_matrix, matrix.T @ (-f.depth * _taper(f, NEAR_TAPER)))
     moves: Floats = amount[:, None] * normal
     return moves
 
@@ -79,10 +80,10 @@ def _normals(f: Furrow, surface: DCPSurface) -> tuple[Floats, Floats, Floats]:
     return normal / np.linalg.norm(normal, axis=1)[:, None], su, sv
 
 
-def _taper(f: Furrow, least: float = 0.15) -> Floats:
-    """Return (k,): share of the depth along the line, whose ends run out."""
+def _taper(f: Furrow, taper: float) -> Floats:
+    """Return (k,): share of the depth along the line, whose ends run out over ``taper`` of its length."""
     t = np.linspace(0.0, 1.0, len(f.uv))
-    return least + (1.0 - least) * smoothstep(np.minimum(t, 1.0 - t) / TAPER)
+    return np.asarray(smoothstep(np.minimum(t, 1.0 - t) / taper))
 
 
 def _sideways_step(f: Furrow, su: Floats, sv: Floats) -> Floats:

@@ -11,9 +11,38 @@ from surface.head.model.look import OWN_MELANIN, Colour, Look, skin_albedo, skin
 from surface.head.model.parameters import smoothstep
 from surface.head.posing.part import HeadPart
 
+Region = tuple[tuple[float, float], tuple[float, float], float]
 LIPS_GLOSS = (0.48, 0.74)  # gloss in the painted layers at the rim of the lips, and on them
 LIP_FADE = 0.22  # fraction by which lips darken less than skin, on a logarithmic scale
 LIP_OPACITY = 0.75  # of a lip colour
+PLAIN_GLOSS = 0.3  # of skin that nothing is painted on
+#: Where skin shines more or less than elsewhere: centre and reach (x to both sides, y, in distances of the eyes from
+#: each other, from the middle between them), and the gloss that is added there. Sebum makes forehead, nose and chin
+#: shine; the sides of the face, the jaw and the sockets of the eyes are dry.
+SHINE = (
+    ((0.0, 0.72), (0.55, 0.30), 0.10),
+    ((0.0, -0.20), (0.13, 0.40), 0.16),
+    ((0.0, -0.62), (0.26, 0.16), 0.22),
+    ((0.60, -0.38), (0.26, 0.20), 0.09),
+    ((0.0, -1.62), (0.24, 0.18), 0.08),
+    ((0.48, -0.05), (0.30, 0.16), -0.10),
+    ((1.05, -0.60), (0.40, 1.10), -0.16),
+    ((0.62, -1.30), (0.32, 0.40), -0.12),
+)
+#: Where skin with much melanin is darker (above 0) or lighter than its tone, as above, in density at a melanin of 1:
+#: round eyes and mouth and towards the outline it is darker, where it is stretched over bone lighter.
+UNEVEN = (
+    ((0.0, 0.74), (0.42, 0.26), -0.07),
+    ((0.55, -0.40), (0.28, 0.22), -0.12),
+    ((0.0, -0.30), (0.14, 0.40), -0.06),
+    ((0.45, -0.02), (0.26, 0.17), 0.16),
+    ((0.0, -1.12), (0.48, 0.26), 0.14),
+    ((0.95, 0.55), (0.35, 0.55), 0.16),
+    ((0.95, -0.90), (0.38, 0.60), 0.12),
+)
+#: Patches of skin: directions and wave numbers (cycles in the distance of the eyes), whose waves add up.
+PATCHES = np.array(((1.9, 1.1, 0.6), (-1.3, 2.3, 0.9), (2.9, -0.7, 1.7), (0.8, 3.3, -1.9), (-3.7, 1.9, 1.2)))
+PATCHY_SHINE, PATCHY_TONE = 0.12, 0.05  # of the gloss, and in density at a melanin of 1
 
 
 def apply_look(parts: Iterable[HeadPart], look: Look, eyes: Floats) -> None:
@@ -24,6 +53,8 @@ def apply_look(parts: Iterable[HeadPart], look: Look, eyes: Floats) -> None:
     for part in parts:
         if part.material == "skin":
             _colour_skin(part, look)
+            _spread_gloss(part, eyes)
+            _mottle(part, look, eyes)
             if look.freckles > 0.0:
                 part.attributes["freckles"] = look.freckles * _freckle_density(part, eyes)
         elif part.material == "eye" and look.iris is not None:
@@ -70,10 +101,53 @@ def _lip_coverage(part: HeadPart) -> Floats:
     return smoothstep(np.asarray(gloss[:, :1], np.float64), *LIPS_GLOSS)
 
 
+def _spread_gloss(part: HeadPart, eyes: Floats) -> None:
+    """Let skin shine by region, in patches; lips and lid rims keep what is painted on them."""
+    if "albedo" not in part.attributes:
+        return
+    given = np.asarray(part.attributes.get("gloss", np.full((len(part.vertices), 1), PLAIN_GLOSS)), np.float64)
+    places = _places(part, eyes)
+    own = np.clip(PLAIN_GLOSS + _regions(places, SHINE), 0.08, None) * (1.0 + PATCHY_SHINE * _patches(places))
+    painted = np.clip((given - PLAIN_GLOSS) / (LIPS_GLOSS[1] - PLAIN_GLOSS), 0.0, 1.0)
+    part.attributes["gloss"] = (own[:, None] + painted * (given - own[:, None])).astype(np.float32)
+
+
+def _mottle(part: HeadPart, look: Look, eyes: Floats) -> None:
+    """Make skin uneven by its melanin, which is denser in some regions and patches than in others."""
+    if look.melanin is None or "albedo" not in part.attributes:
+        return
+    places = _places(part, eyes)
+    density = look.melanin**2 * (_regions(places, UNEVEN) + PATCHY_TONE * _patches(places[:, ::-1]))[:, None]
+    skin = 1.0 - _lip_coverage(part)
+    part.attributes["albedo"] = (part.attributes["albedo"] * np.exp(-skin * density)).astype(np.float32)
+
+
+def _places(part: HeadPart, eyes: Floats) -> Floats:
+    """Return vertices (m, 3) in distances of the eyes from each other, from the middle between them."""
+    places: Floats = (np.asarray(part.vertices, np.float64) - eyes.mean(axis=0)) / np.linalg.norm(eyes[0] - eyes[1])
+    return places
+
+
+def _regions(places: Floats, regions: Iterable[Region]) -> Floats:
+    """Return (m,): the sum of what is added in each of the ``regions`` of a face, on its front."""
+    x, y, z = places.T
+    front = smoothstep(z, -1.5, -0.3)
+    spots = (
+        amount * np.exp(-(((np.abs(x) - cx) / wide) ** 2) - ((y - cy) / high) ** 2)
+        for (cx, cy), (wide, high), amount in regions
+    )
+    return np.asarray(front * sum(spots))
+
+
+def _patches(places: Floats) -> Floats:
+    """Return (m,): smooth patches, about -1..1, as large as a few centimetres and less."""
+    waves = np.sin(2.0 * np.pi * places @ PATCHES.T + np.arange(len(PATCHES)))
+    return np.asarray(waves.sum(axis=1) / np.sqrt(len(PATCHES)))
+
+
 def _freckle_density(part: HeadPart, eyes: Floats) -> Floats32:
     """Return the density (m, 1) of freckles, 0..1: highest on nose and cheeks, lower on the forehead."""
-    middle, apart = eyes.mean(axis=0), float(np.linalg.norm(eyes[0] - eyes[1]))
-    x, y, z = ((np.asarray(part.vertices, np.float64) - middle) / apart).T
+    x, y, z = _places(part, eyes).T
     front = smoothstep(z, -0.55, 0.1)
     cheeks = np.exp(-(((np.abs(x) - 0.35) / 0.55) ** 4) - ((y + 0.42) / 0.42) ** 2)
     forehead = 0.35 * np.exp(-((x / 0.9) ** 2) - ((y - 0.7) / 0.45) ** 2)

@@ -34,7 +34,7 @@ from surface.head.posing.contact_solve import NAMES, SIDES, clear_bound, gather_
 from surface.spline.kernels import fill_rows, row_capacity
 
 CONTACT_SHARE = 2 / 3  # fraction of the rows at an opening that can touch the other side; in the rest corrections fade
-INNER_SHARE = 0.8  # of these rows at lips
+INNER_SHARE = 0.7  # of these rows at lips
 SOFT_MM = 0.1
 OVERLAP_MM = (0.28, 0.9)  # allowed overlap of lips and of lids: triangles cut about that off the edges of both sides
 NEARLY_MM = 1.2  # lips nearer than this at rest count as closed

@@ -338,7 +338,7 @@ MATERIALS: dict[str, Material] = {
     "brow": _hair("brow", (0.70, 0.46, 0.36, 1.7), 1.0),
     "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, _necked, order=3),
     "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.42, _grooved, order=4),
-    "gums": _inner((0.48, 0.15, 0.14), 0.3, 0.20, order=5),
+    "gums": _inner((0.57, 0.25, 0.23), 0.3, 0.20, order=5),
     "mouth": _inner((0.46, 0.16, 0.15), 0.3, 0.20, two_sided=True, order=6),
 }
 

@@ -1,6 +1,6 @@
 // Teeth, gums, tongue and the mouth's lining: lit by what comes in between the lips, per vertex.
 #define WALLS vec3(0.50, 0.18, 0.16)
-#define GUM vec3(0.48, 0.15, 0.14)
+#define GUM vec3(0.57, 0.25, 0.23)
 #define NEIGHBOURS vec3(0.84, 0.82, 0.80)
 #define DEEP_MM vec2(12.0, 40.0)  // behind the lips: where the mouth's inside begins to be deep, and where it is
 #define ARCH_MM 45.0              // how far behind the lips the middle of the row of teeth lies

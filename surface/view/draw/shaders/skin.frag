@@ -1,3 +1,5 @@
+#define PORES_DULL 5.0  // how much less pores shine, and the skin between them more: grain is 0.08 at most
+
 uniform sampler2D detail;
 uniform float detail_strength;
 
@@ -81,7 +83,7 @@ void main() {
 #ifdef LIPS
     lit *= lips();
 #endif
-    lit += key_colour * (wide * v_normal_wide.w + narrow * v_half_narrow.w);
+    lit += key_colour * ((wide * v_normal_wide.w + narrow * v_half_narrow.w) * (1.0 + PORES_DULL * grain.w));
 #ifdef FRECKLES
     lit *= mix(vec3(1.0), vec3(0.76, 0.62, 0.52), freckle());
 #endif

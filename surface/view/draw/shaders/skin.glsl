@@ -1,7 +1,7 @@
 // How skin answers the lights, per vertex.
-#define WIDE_SHARPNESS 9.0      // the narrow lobe is the wide one to the fourth power
-#define WIDE 0.050
-#define NARROW 0.24
+#define WIDE_SHARPNESS 11.0     // the narrow lobe is the wide one to the fourth power
+#define WIDE 0.150              // of the gloss, as NARROW
+#define NARROW 0.27
 
 uniform vec3 wrap;
 uniform vec3 through;           // colour of light that comes through thin skin
@@ -23,14 +23,18 @@ float reaching(vec4 around, vec3 light) {
 
 // Everything but the key light's highlights; `sun` is how much of the key light arrives.
 vec3 diffuse(vec3 n, vec3 v, vec3 albedo, float occlusion, float sun, float back, float thin) {
+    // Melanin lies above the blood and absorbs what spreads under the skin: the darker it is, the less it glows.
+    float glowing = clamp(2.2 * albedo.r, 0.4, 1.0);
+    vec3 spread = wrap * glowing;
     // Blood colours what little light leaves a crevice: occlusion bites less in red.
-    vec3 open = occlusion + (1.0 - occlusion) * (occlusion * vec3(0.60, 0.15, 0.05) + vec3(0.10, 0.035, 0.025));
+    vec3 bled = mix(vec3(0.15), vec3(0.60, 0.15, 0.05), glowing);
+    vec3 open = occlusion + (1.0 - occlusion) * (occlusion * bled + vec3(0.10, 0.035, 0.025));
     // Light spreads into a shadow's edge under the skin, red the furthest.
-    vec3 lit = sun * mix(vec3(1.0), vec3(sun), 0.5 * (1.0 - wrap));
+    vec3 lit = sun * mix(vec3(1.0), vec3(sun), 0.5 * (1.0 - spread));
     float rim = dot(n, rim_direction);
-    vec3 light = key_colour * wrapped(dot(n, key_direction), wrap) * (0.12 + 0.88 * lit);
-    light += fill_colour * wrapped(dot(n, fill_direction), wrap) * open;
-    light += rim_colour * wrapped(rim, wrap) * back;
+    vec3 light = key_colour * wrapped(dot(n, key_direction), spread) * (0.12 + 0.88 * lit);
+    light += fill_colour * wrapped(dot(n, fill_direction), spread) * open;
+    light += rim_colour * wrapped(rim, spread) * back;
     light += ambient(n) * open;
     vec3 glow = key_colour * clamp(0.10 - dot(n, key_direction), 0.0, 1.0) + rim_colour * clamp(0.10 - rim, 0.0, 1.0);
     light += thin * occlusion * occlusion * through * glow;

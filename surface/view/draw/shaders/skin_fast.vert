@@ -1,4 +1,6 @@
 // Skin worked out per vertex, all of it.
+#define SMEARED 0.15  // of the gloss, in place of NARROW: between vertices a narrow highlight smears, and looks like wax
+
 uniform mat4 view_projection;
 uniform vec3 camera;
 
@@ -25,7 +27,8 @@ void main() {
     float narrow = wide * wide;
     narrow *= narrow;
     float sun = reaching(around, key_at_rest);
-    float shine = highlight(normal, v) * albedo_occlusion.a * sun * (WIDE * wide + NARROW * narrow * surface_uv_gloss.z);
+    float shine = highlight(normal, v) * albedo_occlusion.a * sun * surface_uv_gloss.z
+        * (WIDE * wide + SMEARED * narrow);
     vec3 lit = diffuse(normal, v, albedo, albedo_occlusion.a, sun, reaching(around, rim_at_rest), surface_uv_gloss.w);
     lit += shine * key_colour;
 #ifdef PANELS

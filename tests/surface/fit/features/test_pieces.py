@@ -118,6 +118,8 @@ def test_skin_has_groups_shares_and_slits_and_what_is_fixed_has_none(fitted):
     ]
     assert (part.weights == 1).all() and (part.degrees == 3).all() and not part.lids.any()
     np.testing.assert_array_equal(part.points, fit.points)
+    raised = skin_part(recipe(raised=1.5), chart, fit, rig())
+    np.testing.assert_allclose(raised.points - fit.points, np.tile([0.0, 1.5, 0.0], (len(fit.points), 1)))
     fixed = skin_part(recipe(follows="jaw"), chart, fit, rig(np.array([[30.0, 0, 30], [-30, 0, 30]])))
     assert fixed.groups == [] and not fixed.jaw.any() and not fixed.lids.any()
     lids = skin_part(recipe(), chart, fit, rig(np.array([[30.0, 0, 30], [-30, 0, 30]]))).lids

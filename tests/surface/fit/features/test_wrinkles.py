@@ -167,7 +167,8 @@ def test_points_of_a_wrinkle_move_along_the_normals_of_the_skin(wrinkled):
     normal = np.column_stack([-dx, -dy, np.ones_like(dx)])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     amount = (fold.moves * normal).sum(axis=1)
-    assert (amount < 0.0).all()
+    assert (amount[1:-1] < 0.0).all()
+    assert np.abs(amount[[0, -1]]).max() < 0.05 * np.abs(amount).max(), "its ends run out"
     np.testing.assert_allclose(fold.moves, amount[:, None] * normal, atol=0.03 * np.abs(amount).max())
 
 

@@ -7,7 +7,17 @@ import pytest
 
 from surface.base.arrays import Floats
 from surface.dcp import DCPSurface
-from surface.head.model.furrow import REGULARISATION, RIDGE, SPAN, TAPER, Furrow, even_moves, furrow_knots, furrow_moves
+from surface.head.model.furrow import (
+    NEAR_TAPER,
+    REGULARISATION,
+    RIDGE,
+    SPAN,
+    TAPER,
+    Furrow,
+    even_moves,
+    furrow_knots,
+    furrow_moves,
+)
 from surface.head.model.light import WEIGHT
 
 WIDE, HIGH = 100.0, 80.0
@@ -84,7 +94,7 @@ def test_moves_are_the_least_squares_ones_for_a_trough_with_a_ridge_on_either_si
     x = np.linspace(-2.5, 2.5, 11)  # in widths
     trough = np.exp(-2.0 * x**2) - RIDGE * np.exp(-2.0 * (np.abs(x) - 1.3) ** 2)
     t = np.minimum(np.linspace(0, 1, 9), np.linspace(1, 0, 9)) / TAPER
-    ends = 0.15 + 0.85 * np.where(t < 1, t**2 * (3 - 2 * t), 1.0)
+    ends = np.where(t < 1, t**2 * (3 - 2 * t), 1.0)
     places = np.stack(
         [np.broadcast_to(f.uv[:, 0], (11, 9)), 0.5 + np.broadcast_to(x[:, None], (11, 9)) * 6.0 / HIGH], -1
     )
@@ -109,10 +119,10 @@ def test_points_near_each_other_sink_the_line_evenly_by_the_depth() -> None:
     moves = even_moves(f, surface, ids)
     u = np.linspace(0.3, 0.7, 201)
     found = sunk(surface, ids, moves, np.column_stack([u, np.full(201, 0.5)]))
-    middle = np.abs(u - 0.5) < 0.2 - TAPER * 0.4
+    middle = np.abs(u - 0.5) < 0.2 - NEAR_TAPER * 0.4
     np.testing.assert_allclose(found[middle], -1.5, atol=0.12)
     assert np.abs(np.diff(found[middle], 2)).max() < 0.01  # nothing ripples
     assert found[0] == pytest.approx(0.0, abs=0.15) and found[-1] == pytest.approx(found[0], abs=1e-6)
-    share = (u[:60] - 0.3) / 0.4 / TAPER
+    share = (u[:60] - 0.3) / 0.4 / NEAR_TAPER
     wanted = -1.5 * np.clip(share, 0, 1) ** 2 * (3 - 2 * np.clip(share, 0, 1))
     np.testing.assert_allclose(found[:60], wanted, atol=0.2)

@@ -220,7 +220,7 @@ def test_what_is_inside_the_mouth_is_reddish_and_teeth_are_nearly_white() -> Non
     }
     assert {name: (*one["albedo"], one["wrap"][0], one["wetness"]) for name, one in given.items()} == {
         "teeth": (0.76, 0.71, 0.62, 0.3, 0.30), "tongue": (0.50, 0.17, 0.15, 0.4, 0.42),
-        "gums": (0.48, 0.15, 0.14, 0.3, 0.20), "mouth": (0.46, 0.16, 0.15, 0.3, 0.20),
+        "gums": (0.57, 0.25, 0.23, 0.3, 0.20), "mouth": (0.46, 0.16, 0.15, 0.3, 0.20),
     }  # fmt: skip
     for one in given.values():
         assert one["wrap"][1:] == pytest.approx([0.6 * one["wrap"][0]] * 2)
