@@ -20,10 +20,10 @@ from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.head.model.parameters import SHAPES, smoothstep
 from surface.head.posing.contact import lip_weights, weights_at
 
-STILL_MM, MOVED_MM = 0.02, 0.06  # skin that a shape moves less stays; from the second on it moves as before
-OFF_MM = 0.09  # groups that would be off by more than that somewhere stay as they are
+STILL_MM, MOVED_MM = 0.03, 0.1  # skin that a shape moves less stays; from the second on it moves as before
+OFF_MM = 0.13  # groups that would be off by more than that somewhere stay as they are
 QUIET_MM = 0.05  # shapes that move the samples of a contact less leave it alone
-MIN_SHARES = 0.02, 0.005, 0.0  # of a point's weights, in skin that moves: with less it stays; tried one by one
+MIN_SHARES = 0.1, 0.02, 0.005  # of a point's weights, in skin that moves: with less it stays; tried one by one
 FULL_SHARE = 0.999  # with more it moves as before
 RIDGE = 1e-3  # weight of keeping the points' displacements, relative to a sample's
 
