@@ -28,6 +28,7 @@ from surface.fit.features.levelled import level_seams
 from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.features.rigging import find_jaw
 from surface.fit.features.wrinkles import with_deep_wrinkles
+from surface.fit.filling.api import Filling, filled
 from surface.fit.measures.dense import errors_at_rest
 from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
 from surface.fit.measures.refusal import save_or_refuse
@@ -64,6 +65,7 @@ from surface.head.posing.fit_error import write_fit_error
 from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig
 
+FILLING = 0.4  # of the time of a fit that fills in shapes: how long that takes
 OTHER_MESH_MM = 1.0  # RMS distance at rest that only a head fitted to another mesh has
 # Errors on an average head from which on a part beside the face, such as hair, is left out.
 LOOSE_MM = 3.0  # RMS
@@ -77,6 +79,7 @@ LINING_POSE = {**SAMPLE_POSE, "jawOpen": 1.0, "mouthClose": 0.5}  # of what line
 def fit_head(
     mesh_path: str | Path, out_dir: str | Path, *, name: str, progress: Progress | None = None,
     options: LoadOptions = LoadOptions(), report_dir: str | Path | None = None, force: bool = False,
+    filling: Filling | None = None,
 ) -> FitReport:  # fmt: skip
     """Fit a head to a mesh and write it.
 
@@ -85,6 +88,7 @@ def fit_head(
     progress : called with the part being fitted and the fraction done, 0..1.
     options : how to interpret the mesh. report_dir : folder that gets the report (see
         :func:`surface.fit.reportfile.write_report`). force : write a head that does not follow its mesh, too.
+    filling : a head that gives the shapes which the mesh lacks.
 
     Raises FitError: the mesh cannot be read, has no faces, holds NaN, is no manifold, or does
     not fit together; nothing is written then. Or the head does not follow the mesh (:func:`faults_of`): it is written
@@ -95,6 +99,9 @@ def fit_head(
     for folder in (out_dir, report_dir):
         check_writable(folder or out_dir)
     loaded = load_mesh(mesh_path, options)
+    if filling is not None:
+        loaded = filled(loaded, mesh_path, filling, options, part_of(report, 0.0, FILLING))
+        report = part_of(report, FILLING, 1.0)
     result = fit_mesh(loaded, name, report, str(mesh_path))
     if report_dir is not None:
         write_report(result, report_dir, report)
@@ -165,7 +172,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
         loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets,
-        {**loaded.pieces, **worn.pieces}, dense, tuple(faults_of(dense, fitted_parts, scale)),
+        {**loaded.pieces, **worn.pieces}, dense, tuple(faults_of(dense, fitted_parts, scale)), loaded.named.filled,
     )  # fmt: skip
     return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts), worn.accessories)
 
