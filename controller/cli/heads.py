@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 _NO_SHADE = "no OpenGL here: the head has no baked shading; for a better picture, fit it on a machine with OpenGL"
 _FEW_SHAPES = (
-    "the mesh has few shapes of a face, or none: add --expressions-from ict to the same command; the head then gets those "
-    "that the mesh lacks from another head"
+    "the mesh has few shapes of a face, or none: with --expressions-from ict, the head gets those that it lacks, and "
+    "keeps its own"
 )
 Identity = Annotated[
     str | None,

@@ -76,7 +76,7 @@ def filled(loaded: Loaded, path: str | Path, filling: Filling, options: LoadOpti
     picked = read_landmarks(filling.landmarks, scan) if filling.landmarks is not None else {}
     head = Head.load(filling.head)
     rims = rims_of_mesh(loaded.mesh)
-    seen = {n: loaded.placement.file_points(at) for n, at in rims.marks().items()} if rims else {}
+    seen = {n: loaded.placement.file_points(at) for n, at in rims.corners().items()} if rims else {}
     axes = _in_its_axes(options, loaded.placement)
     made = transfer(scan, head, head.name, picked, axes, progress, str(path), seen)
     if faults := made.report.fit.faults:

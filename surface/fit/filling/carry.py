@@ -47,6 +47,7 @@ class Carrier:
         head.pose(head.values({}))
         normals = np.concatenate([part.normals for part in head.parts]).astype(np.float64)
         self._normals = normals / np.maximum(np.linalg.norm(normals, axis=1), 1e-12)[:, None]
+        self._tongue = np.zeros_like(mesh.vertices)  # from its place to the head's: put out, it lies where that lies
         self._matrix, known = self._share_of(mesh)
         self._continued = Continued(mesh, known)
 
@@ -56,6 +57,8 @@ class Carrier:
         for row, name in zip(out, names, strict=True):
             row[:] = self._matrix @ np.concatenate(self._subject.moves(name)).astype(np.float64)
             self._continued.fill(row)
+            if name == "tongueOut":
+                row += self._tongue
         return out
 
     def _share_of(self, mesh: FitMesh) -> tuple[csr_matrix, Bools]:
@@ -68,6 +71,8 @@ class Carrier:
             rows, found = self._nearest(kind, mesh.vertices[ids], normals[ids], eyes=not (sort == EYE).any())
             matrix += _spread(rows, ids[found], self._count)
             known[ids[found]] = True
+            if kind == TONGUE and len(ids):
+                self._tongue[ids] = _boxed(mesh.vertices[ids], self._rest[self._of(FROM[TONGUE])]) - mesh.vertices[ids]
         for follows in RIGID:
             ids = np.flatnonzero(sort == follows)
             matrix += _spread(self._rigid(follows, mesh.vertices[ids]), ids, self._count)

@@ -35,12 +35,12 @@ class Rims:
 
     places: Floats
 
-    def marks(self) -> dict[str, Floats]:
-        """Places (3,) by the names of a transfer's landmarks."""
+    def corners(self) -> dict[str, Floats]:
+        """Places (3,) of the corners by the names of a transfer's landmarks. Its middles of lids are no rims that can
+        be seen: they lie on the lids' inner edges."""
         out: dict[str, Floats] = {}
         for side, (upper, lower) in zip(SIDES, self.places, strict=True):
             out[f"{side}_eye_inner"], out[f"{side}_eye_outer"] = (0.5 * (upper[k] + lower[k]) for k in (0, -1))
-            out[f"{side}_eye_upper"], out[f"{side}_eye_lower"] = (lid[COLUMNS // 2] for lid in (upper, lower))
         return out
 
     def moved_to(self, other: Rims, points: Floats) -> Floats:
