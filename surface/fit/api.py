@@ -20,6 +20,7 @@ from surface.fit.features.blink_squints import cancel_squints_in_blinks
 from surface.fit.features.cavity import MATERIAL
 from surface.fit.features.combs import combed
 from surface.fit.features.cutouts import cut_out
+from surface.fit.features.eye_corners import corners_part, flesh_paint
 from surface.fit.features.findings import findings
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
@@ -148,10 +149,16 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress, comb=not loaded.exported)
     charts = {p.name: p.chart for p in fitted_parts}
     paint = make_paint(recipe.paint, charts, mesh)
+    scale, seams = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True))), find_seams(charts)
+    bands = None
+    if plan.found and plan.found.openings and not loaded.exported:  # an export has such bands
+        bands = corners_part(parts[0].name, fitted_parts[0].chart, fitted_parts[0].fitted, mesh, rig, scale)
+    parts, seams = (parts, seams) if bands is None else ([*parts, bands[0]], [*seams, *bands[1]])
     paint += paint_layers(mesh, plan.found, parts) if plan.found else []
+    paint += [] if bands is None else flesh_paint()
     head = HeadData(
         name, _provenance(recipe), _neck(mesh, recipe, loaded.marks), rig.eyes, rig.radius, rig.jaw,
-        parts, find_seams(charts), paint, placement=loaded.placement,
+        parts, seams, paint, placement=loaded.placement,
     )  # fmt: skip
     if recipe.parts:  # of other meshes nobody knows whether a crease is theirs
         head = level_seams(head)
@@ -163,7 +170,6 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         plan.notes.extend([*lid_notes, *squint_notes])
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
-    scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
     head = with_greatest_error(head, str(dense.greatest) if dense.greatest else "")
     notes = [*worn.notes, *loaded.notes, *plan.notes, *turned_faces(mesh), *mended]
