@@ -21,6 +21,7 @@ from surface.base.extras import require
 if TYPE_CHECKING:
     from controller.base.parameters import Parameters  # imported lazily: not needed for --help
     from controller.tools.surface_fit import SurfaceFit  # imported lazily: not needed for --help
+    from controller.tools.transfer import Source  # imported lazily: not needed for --help
     from surface.export.animation import Animation  # imported lazily: not needed for --help
     from surface.fit.points.report import FitReport  # imported lazily: not needed for --help
     from surface.fit.source.load import LoadOptions  # imported lazily: not needed for --help
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
 
 _NO_SHADE = "no OpenGL here: the head has no baked shading; for a better picture, fit it on a machine with OpenGL"
 _FEW_SHAPES = (
-    "the mesh has few shapes of a face, or none: --expressions-from ict transfers the expressions of another head to it"
+    "the mesh has few shapes of a face, or none: with --expressions-from ict, the head gets those that it lacks, and "
+    "keeps its own"
 )
 Identity = Annotated[
     str | None,
@@ -188,10 +190,16 @@ def fit(
         typer.Option(
             "--expressions-from",
             metavar="HEAD",
-            help="Head, as ict, whose expressions are transferred to a mesh without shapes, or to surfaces.",
+            help="Head, as ict, whose expressions a mesh gets in place of those it has no shapes for; also surfaces.",
             autocompletion=names_of("heads"),
         ),
     ] = None,
+    no_own_shapes: Annotated[
+        bool,
+        typer.Option(
+            "--no-own-shapes", help="With --expressions-from: take none of the mesh's own shapes, but all there."
+        ),
+    ] = False,
     landmarks: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="Landmarks picked on the mesh (.toml, .json, .pp), for --expressions-from."),
@@ -211,13 +219,13 @@ def fit(
     """
     # imported lazily: not needed for --help
     from controller.tools.surface_fit import SurfaceFit, is_surface_file, reject_surface_options
-    from controller.tools.transfer import check_transfer
+    from controller.tools.transfer import Source, check_transfer
     from surface.fit.identities import add_identities
     from surface.fit.source.load import LoadOptions
 
     if is_surface_file(mesh):
         meshes_only = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep}
-        meshes_only |= {"--force": force}
+        meshes_only |= {"--force": force, "--no-own-shapes": no_own_shapes}
         job = SurfaceFit(
             mesh, out, name, unit, up, forward, tuple(without or ()), tuple(only or ()), tuple(groups or ()),
             strict, expressions_from, landmarks, report,
@@ -227,14 +235,15 @@ def fit(
         return
     reject_surface_options(mesh, {"--only": only, "--groups": groups, "--strict": strict})
 
-    given = {"--shapes": shapes, "--names": names, "--identities": identities, "--keep": keep}
-    check_transfer(expressions_from, landmarks, given)
+    given = {"--identities": identities, "--keep": keep}
+    check_transfer(expressions_from, landmarks, given, own_shapes=not no_own_shapes)
     options = LoadOptions(shapes, names, unit, up, forward, tuple(without or ()))
     if keep:
         _reject_with_keep(mesh, out, {"--name": name, "--report": report, "--force": force})
         _measure_head(mesh, out, options)
     else:
-        _fit_mesh(mesh, out, name or out.resolve().name, options, expressions_from, landmarks, report, force)
+        source = Source(expressions_from, landmarks, not no_own_shapes) if expressions_from is not None else None
+        _fit_mesh(mesh, out, name or out.resolve().name, options, source, report, force)
     if identities is not None:
         with console.status("fitting identities"):
             added = add_identities(out, mesh, identities)
@@ -254,9 +263,8 @@ def _reject_with_keep(mesh: Path, out: Path, given: Mapping[str, object]) -> Non
 
 
 def _fit_mesh(
-    mesh: Path, out: Path, title: str, options: LoadOptions, expressions_from: str | None, landmarks: Path | None,
-    report: Path | None, force: bool,
-) -> None:  # fmt: skip
+    mesh: Path, out: Path, title: str, options: LoadOptions, source: Source | None, report: Path | None, force: bool
+) -> None:
     """Write a head made from a mesh, with its own shapes or the expressions of another head, and print the errors."""
     from controller.tools.transfer import transfer  # imported lazily: not needed for --help
     from surface.fit.api import fit_head
@@ -269,8 +277,8 @@ def _fit_mesh(
             step = "writing the report" if part == "report" else f"fitting {part}"
             bar.update(task, description=step, completed=done)
 
-        if expressions_from is not None:
-            found = transfer(mesh, expressions_from, out, title, landmarks, options, progress, report, force)
+        if source is not None:
+            found = transfer(mesh, source, out, title, options, progress, report, force)
         else:
             found = fit_head(mesh, out, name=title, progress=progress, options=options, report_dir=report, force=force)
     shaded = _decimate_and_shade(out)

@@ -64,7 +64,7 @@ def blind_lids(subject: Subject) -> Iterator[Finding]:
             continue
         if name not in subject.claimed:
             text = f"the head has no {name}: the eye stays {opening:.1f} mm open"
-            hint = f"export the mesh with a shape that closes the eyes, then {AGAIN}"
+            hint = f"{AGAIN} --expressions-from ict, or export the mesh with a shape that closes the eyes"
             yield Finding("blind lid", text, hint, warning=not any_blink)
             continue
         left = eye_opening(subject, side, subject.at_one(name))

@@ -20,6 +20,7 @@ from surface.fit.features.blink_squints import cancel_squints_in_blinks
 from surface.fit.features.cavity import MATERIAL
 from surface.fit.features.combs import combed
 from surface.fit.features.cutouts import cut_out
+from surface.fit.features.eye_corners import corners_part, flesh_paint
 from surface.fit.features.findings import findings
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
@@ -28,6 +29,7 @@ from surface.fit.features.levelled import level_seams
 from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.features.rigging import find_jaw
 from surface.fit.features.wrinkles import with_deep_wrinkles
+from surface.fit.filling.api import Filling, filled
 from surface.fit.measures.dense import errors_at_rest
 from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
 from surface.fit.measures.refusal import save_or_refuse
@@ -65,6 +67,7 @@ from surface.head.posing.fit_error import write_fit_error
 from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig
 
+FILLING = 0.4  # of the time of a fit that fills in shapes: how long that takes
 OTHER_MESH_MM = 1.0  # RMS distance at rest that only a head fitted to another mesh has
 # Errors on an average head from which on a part beside the face, such as hair, is left out.
 LOOSE_MM = 3.0  # RMS
@@ -78,6 +81,7 @@ LINING_POSE = {**SAMPLE_POSE, "jawOpen": 1.0, "mouthClose": 0.5}  # of what line
 def fit_head(
     mesh_path: str | Path, out_dir: str | Path, *, name: str, progress: Progress | None = None,
     options: LoadOptions = LoadOptions(), report_dir: str | Path | None = None, force: bool = False,
+    filling: Filling | None = None,
 ) -> FitReport:  # fmt: skip
     """Fit a head to a mesh and write it.
 
@@ -86,6 +90,7 @@ def fit_head(
     progress : called with the part being fitted and the fraction done, 0..1.
     options : how to interpret the mesh. report_dir : folder that gets the report (see
         :func:`surface.fit.reportfile.write_report`). force : write a head that does not follow its mesh, too.
+    filling : a head that gives the shapes which the mesh lacks.
 
     Raises FitError: the mesh cannot be read, has no faces, holds NaN, is no manifold, or does
     not fit together; nothing is written then. Or the head does not follow the mesh (:func:`faults_of`): it is written
@@ -96,6 +101,9 @@ def fit_head(
     for folder in (out_dir, report_dir):
         check_writable(folder or out_dir)
     loaded = load_mesh(mesh_path, options)
+    if filling is not None:
+        loaded = filled(loaded, mesh_path, filling, options, part_of(report, 0.0, FILLING))
+        report = part_of(report, FILLING, 1.0)
     result = fit_mesh(loaded, name, report, str(mesh_path))
     if report_dir is not None:
         write_report(result, report_dir, report)
@@ -142,10 +150,16 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     parts, reports, fitted_parts = _fit_parts(mesh, recipe, plan, rig, progress, comb=not loaded.exported)
     charts = {p.name: p.chart for p in fitted_parts}
     paint = make_paint(recipe.paint, charts, mesh)
+    scale, seams = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True))), find_seams(charts)
+    bands = None
+    if plan.found and plan.found.openings and not loaded.exported:  # an export has such bands
+        bands = corners_part(parts[0].name, fitted_parts[0].chart, fitted_parts[0].fitted, mesh, rig, scale)
+    parts, seams = (parts, seams) if bands is None else ([*parts, bands[0]], [*seams, *bands[1]])
     paint += paint_layers(mesh, plan.found, parts) if plan.found else []
+    paint += [] if bands is None else flesh_paint()
     head = HeadData(
         name, _provenance(recipe), _neck(mesh, recipe, loaded.marks), rig.eyes, rig.radius, rig.jaw,
-        parts, find_seams(charts), paint, placement=loaded.placement,
+        parts, seams, paint, placement=loaded.placement,
     )  # fmt: skip
     if recipe.parts:  # of other meshes nobody knows whether a crease is theirs
         head = level_seams(head)
@@ -157,7 +171,6 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         plan.notes.extend([*lid_notes, *squint_notes])
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
-    scale = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True)))
     head = localised(head, scale)
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
     head = with_greatest_error(head, str(dense.greatest) if dense.greatest else "")
@@ -167,7 +180,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
         loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets,
-        {**loaded.pieces, **worn.pieces}, dense, tuple(faults_of(dense, fitted_parts, scale)),
+        {**loaded.pieces, **worn.pieces}, dense, tuple(faults_of(dense, fitted_parts, scale)), loaded.named.filled,
     )  # fmt: skip
     return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts), worn.accessories)
 

@@ -58,7 +58,8 @@ def _as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
         "control_points": report.points, "parameters": report.parameters,
         "missing": list(report.missing), "left_out": list(report.left_out), "notes": list(report.notes),
         "faults": list(report.faults),
-        "shapes": report.shapes, "empty": list(report.empty), "presets": list(report.presets), "pieces": report.pieces,
+        "shapes": report.shapes, "filled": report.filled,
+        "empty": list(report.empty), "presets": list(report.presets), "pieces": report.pieces,
         "parts": [
             {
                 "name": p.name, "control_points": p.points, "samples": p.samples, "excluded_samples": p.folded,

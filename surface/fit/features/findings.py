@@ -24,7 +24,9 @@ NO_EYES = (
     "eyeballs with the face, each as a piece of its own)"
 )
 NO_LIDS = (
-    "no lids: no shape closes {}; these eyes stay open (give the mesh shapes of that name, or say theirs by --names)"
+    "the lids do not move: the mesh has no shape {}, so these eyes never blink. Type the command again with "
+    "--expressions-from ict: the head keeps the mesh's own shapes, and gets those that it lacks from the shipped head "
+    "(or give the mesh shapes of that name, or say theirs by --names)"
 )
 
 

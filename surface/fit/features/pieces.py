@@ -236,7 +236,7 @@ def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], rig
                 0.45 + 0.55 * np.sin(np.pi * np.clip(0.12 + 0.62 * along, 0, 1))
             )
             lashes.append(lash_strip(skin, root, eye, length, upper=upper, hairs=LASHES if upper else LOWER_LASHES))
-    return [_strips_part(n, m, s, rig) for n, m, s in (("brows", "brow", brows), ("lashes", "lash", lashes))]
+    return [strips_part(n, m, s, rig) for n, m, s in (("brows", "brow", brows), ("lashes", "lash", lashes))]
 
 
 def _brow_patch(chart: Chart, mesh: FitMesh, ids: Ints) -> Floats:
@@ -261,7 +261,9 @@ def _lid_line(rim: Floats, *, upper: bool, inner_first: bool) -> tuple[Floats, F
     return np.column_stack([u, v + LASH_ROOT[upper] * (1.0 if upper else -1.0)]), along
 
 
-def _strips_part(name: str, material: str, strips: list[Strip], rig: HeadRig) -> PartData:
+def strips_part(
+    name: str, material: str, strips: list[Strip], rig: HeadRig, budget: tuple[int, float, int] | None = None
+) -> PartData:
     """Strips as one part, each in its own tile."""
     points = np.concatenate([s.points for s in strips])
     moves = np.concatenate([s.moves for s in strips], axis=1)
@@ -272,5 +274,5 @@ def _strips_part(name: str, material: str, strips: list[Strip], rig: HeadRig) ->
     loops = [loop + np.array([TILE * k, 0.0]) for k, s in enumerate(strips) for loop in s.loops]
     return PartData(
         name, material, "skin", points, np.ones(len(points)), knots_u, knots_v, degrees, loops, np.zeros((0, 3)),
-        STRIP_BUDGET[material], groups, share, lid_share(points, rig.eyes, rig.radius),
+        budget or STRIP_BUDGET[material], groups, share, lid_share(points, rig.eyes, rig.radius),
     )  # fmt: skip

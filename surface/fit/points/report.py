@@ -186,6 +186,7 @@ class FitReport:
     pieces : the mesh's objects and what kind each is, left out or not.
     dense : errors of the posed head by true distances, both ways.
     faults : what a head is refused for, in words; none of a usable one.
+    filled : parameters that the mesh lacks, with the name of the head that they come from.
     """
 
     name: str
@@ -201,6 +202,7 @@ class FitReport:
     pieces: dict[str, str] = field(default_factory=dict)
     dense: DenseErrors | None = None
     faults: tuple[str, ...] = ()
+    filled: dict[str, str] = field(default_factory=dict)
 
     @property
     def points(self) -> int:

@@ -74,7 +74,7 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     not fit together; names file and element.
     """
     path = Path(path)
-    raw = _read(path, options.shapes)
+    raw = read_mesh(path, options.shapes)
     mesh = fit_mesh_of(raw)
     if options.without:
         mesh = keep_faces(mesh, wanted_faces(mesh, options.without, str(path)))
@@ -151,7 +151,8 @@ def _turned(frame: Frame) -> Landmarks:
     return Landmarks(eyes, at(frame.marks.mouth), at(frame.marks.jaw), None if left is None else frame.turn @ left)
 
 
-def _read(path: Path, shapes: Path | None) -> MeshData:
+def read_mesh(path: Path, shapes: Path | None) -> MeshData:
+    """What is in a mesh file of any known format, or in a folder. Raises FitError, as :func:`load_mesh` does."""
     kind = path.suffix.lower()
     if shapes is not None and kind != ".obj" and not path.is_dir():
         raise FitError(f"--shapes {shapes}: belongs to an .obj mesh, {path} has its own shapes", hint="leave it out")

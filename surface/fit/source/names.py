@@ -12,7 +12,7 @@ is at the end of ``presets.toml``.
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from surface.base import files
@@ -51,6 +51,7 @@ class NameMap:
     presets : such shapes that are understood but not needed, since their parameters have shapes of their own.
     spare : shapes that mean what another shape already does.
     mouth, eyes : shapes that show where these are; empty where no shape does.
+    filled : parameters whose shapes are not the mesh's own, with the name of the head that they come from.
     """
 
     sources: dict[str, list[Source]]
@@ -62,10 +63,27 @@ class NameMap:
     spare: tuple[str, ...] = ()
     mouth: tuple[int, ...] = ()
     eyes: tuple[int, ...] = ()
+    filled: dict[str, str] = field(default_factory=dict)
 
     def made_of(self, names: tuple[str, ...]) -> dict[str, list[str]]:
         """For each parameter the names of the shapes that it is made of."""
-        return {p: [names[s.index] for s in every] for p, every in self.sources.items()}
+        own = {p: [names[s.index] for s in every] for p, every in self.sources.items()}
+        return own | {p: [f"{p} of the head {head!r}"] for p, head in self.filled.items()}
+
+    def filled_up(self, parameters: tuple[str, ...], start: int, head: str) -> NameMap:
+        """The map with further shapes of the mesh for parameters, from index ``start`` on, that come from a head."""
+        added = {p: [Source(start + k)] for k, p in enumerate(parameters)}
+        every = {s: (added | self.sources)[s] for s in SHAPES if s in added or s in self.sources}
+        mouth, eyes = _anchors(every)
+        missing = tuple(p for p in self.missing if p not in added)
+        return replace(
+            self,
+            sources=every,
+            missing=missing,
+            mouth=mouth,
+            eyes=eyes,
+            filled=self.filled | dict.fromkeys(added, head),
+        )
 
 
 @dataclass

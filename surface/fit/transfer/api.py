@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
@@ -49,6 +51,7 @@ from surface.head.model.data import with_greatest_error
 from surface.head.model.file import check_writable
 from surface.head.model.placement import Placement
 
+NONE_SEEN: Mapping[str, Floats] = MappingProxyType({})
 MANY = 250_000  # samples of the scan's head once it is found
 MARGIN = 0.35  # around the head, in heights of the face: what lies within it belongs to the head
 USUAL = (0.7, 1.45)  # range of people's sizes, relative to the head that the expressions come from
@@ -106,14 +109,18 @@ def transfer_head(
 
 
 def transfer(
-    scan: Scan, head: Head, name: str, picked: dict[str, Floats], options: LoadOptions, progress: Progress, where: str
+    scan: Scan, head: Head, name: str, picked: dict[str, Floats], options: LoadOptions, progress: Progress, where: str,
+    seen: Mapping[str, Floats] = NONE_SEEN,
 ) -> Transferred:  # fmt: skip
-    """As :func:`transfer_head`, in memory. picked : landmarks (3,) on the scan. where : names the scan in messages."""
+    """As :func:`transfer_head`, in memory. picked : landmarks (3,) on the scan. where : names the scan in messages.
+
+    seen : further landmarks (3,), which are known better than they can be found, but do not say where the head is.
+    """
     template = make_template(head, head.name)
     progress("face", 0.02)
     found = find_face(scan, template, picked, options, where)
     found, mirrored = upright(scan, template, found)
-    scan, marks = in_frame(scan, template, found), {n: found.points(p) for n, p in picked.items()}
+    scan, marks = in_frame(scan, template, found), {n: found.points(p) for n, p in {**seen, **picked}.items()}
     axis = np.array(head.data.neck.pivot)
     samples, done = _registered(scan, template, axis, marks, progress, mirrored=mirrored)
     matcher, shown = Matcher(samples), samples.kept(in_sight(scan, samples.points))

@@ -178,8 +178,8 @@ def test_fit_passes_its_options_on_and_tells_the_errors(fitted, tmp_path, monkey
     report.parameters = ["eyeLookUpLeft"]
     said = CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(out)])
     hint = (
-        "the mesh has few shapes of a face, or none: "
-        "--expressions-from ict transfers the expressions of another head to it"
+        "the mesh has few shapes of a face, or none: with --expressions-from ict, the head gets those that it lacks, "
+        "and keeps its own"
     )
     assert hint in said.output.splitlines() and hint not in lines
     calls.clear()
@@ -214,6 +214,17 @@ def test_a_transfer_can_be_forced_too(tmp_path, monkeypatch):
     for more in ([], ["--force"]):
         assert isinstance(CliRunner().invoke(make_app(), [*words, *more]).exception, ZeroDivisionError)
     assert [given["force"] for given in heard] == [False, True]
+
+
+def test_a_mesh_with_shapes_keeps_them_in_a_transfer(tmp_path, monkeypatch):
+    heard = []
+    monkeypatch.setattr("controller.tools.transfer.shapes_in", lambda *_: ("jawOpen",))
+    monkeypatch.setattr("controller.tools.transfer.fit_head", lambda *_, **given: heard.append("filled") or 1 / 0)
+    monkeypatch.setattr("controller.tools.transfer.transfer_head", lambda *_, **given: heard.append("all") or 1 / 0)
+    words = ["fit", "a.glb", "-o", str(tmp_path / "mine"), "--expressions-from", "ict"]
+    for more in ([], ["--no-own-shapes"]):
+        assert isinstance(CliRunner().invoke(make_app(), [*words, *more]).exception, ZeroDivisionError)
+    assert heard == ["filled", "all"]
 
 
 @pytest.mark.slow

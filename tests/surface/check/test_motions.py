@@ -130,6 +130,7 @@ def test_a_blink_that_leaves_an_eye_open_is_named() -> None:
 def test_an_eye_that_nothing_closes_is_a_warning_where_the_other_one_has_no_blink_either() -> None:
     (found,) = blinking(8.0, None, 0.0)
     assert found.text.startswith("the head has no eyeBlinkLeft: the eye stays ") and not found.warning
+    assert "--expressions-from ict" in found.hint
     assert [f.warning for f in blinking(8.0, None, None)] == [True, True]
     assert blinking(0.7, None, None) == []  # eyes that are shut at rest need none
     assert len(blinking(1.3, None, None)) == 2

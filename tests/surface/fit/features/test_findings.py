@@ -32,7 +32,8 @@ def test_what_is_missing_says_what_to_do():
     lines = "\n".join(findings(head, Landmarks()))
     assert "the file's unit is 190.5 mm, up is y, forward is z; it stands where it belongs" in lines
     assert "the head's place is not known" in lines and "no eyes:" in lines and "as a piece of its own" in lines
-    assert "no lids: no shape closes eyeBlinkLeft or eyeBlinkRight" in lines and "--names" in lines
+    assert "the lids do not move: the mesh has no shape eyeBlinkLeft or eyeBlinkRight" in lines and "--names" in lines
+    assert "--expressions-from ict" in lines
     assert "not in the mesh, and not drawn: teeth, tongue, brows or hair, lashes" in lines
     assert "place is not known" not in "\n".join(findings(head, EYES))
 
@@ -64,7 +65,7 @@ def test_a_head_that_stands_askew_is_said_to():
 def test_a_lid_without_a_shape_is_named_alone():
     head = small_head(parts=[part("a", -40, groups=BLINKS[:1])], seams=[], paint=[])
     lines = findings(head, EYES)
-    assert any("no shape closes eyeBlinkRight; " in line for line in lines)
+    assert any("no shape eyeBlinkRight, " in line for line in lines)
     assert "found: eyes 60 mm apart, of 24 mm" in lines
 
 
