@@ -10,11 +10,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats, Ints
+from surface.check.cells import joined_nearer
 from surface.check.crossings import Crossings
 from surface.head.model.parameters import smoothstep
 
 ROUNDS = 4
 BACK_MM = (3.0, 8.0)  # distance from what crosses up to which skin goes back fully, and from which on it stays
+TOGETHER_MM = 10.0  # places that cross and are no further apart belong together
+WIDER, WIDEST_MM = 1.5, 30.0  # radius of what goes back as a whole, in theirs; the greatest
 SAME = 1e-6  # vertices that are nearer at rest, relative to the skin's size, are in one place
 
 
@@ -34,8 +37,7 @@ def uncrossed(at: Floats, still: Floats, rest: Floats, triangles: Ints, able: Bo
         if not len(more):
             break
         crossed[more] = True
-        far = cKDTree(rest[crossed]).query(rest, distance_upper_bound=BACK_MM[1])[0]
-        out = at + (1.0 - smoothstep(np.minimum(far, BACK_MM[1]), *BACK_MM))[:, None] * (still - at)
+        out = at + _share(rest, rest[crossed])[:, None] * (still - at)
     return out if len(crossing(found, out, able)) < len(first) else at
 
 
@@ -44,3 +46,18 @@ def crossing(found: Crossings, at: Floats, able: Bools) -> Ints:
     pairs = found.pairs(at)
     ids: Ints = np.unique(found.tree.triangles[pairs.ravel()])
     return ids[able[ids]]
+
+
+def _share(points: Floats, crossed: Floats) -> Floats:
+    """(n,) how far each of points (n, 3) goes back, 0..1, near places ``crossed (k, 3)`` and in the balls round those
+    of them that belong together."""
+    out: Floats = 1.0 - smoothstep(cKDTree(crossed).query(points)[0], *BACK_MM)
+    label = joined_nearer(crossed, np.arange(len(crossed)), TOGETHER_MM)
+    for k in np.unique(label):
+        own = crossed[label == k]
+        middle = 0.5 * (own.min(axis=0) + own.max(axis=0))
+        radius = min(WIDER * float(np.linalg.norm(own - middle, axis=1).max()), WIDEST_MM)
+        beside = np.linalg.norm(points - middle, axis=1) - radius
+        fade = max(radius, BACK_MM[1] - BACK_MM[0])  # a wide place ends gently
+        out = np.maximum(out, 1.0 - smoothstep(beside, BACK_MM[0], BACK_MM[0] + fade))
+    return out

@@ -32,7 +32,7 @@ def test_skin_that_crosses_goes_back_and_the_rest_stays() -> None:
     assert crossed(at) > 10
     made = uncrossed(at, still, REST, TRIANGLES, ABLE)
     assert crossed(made) == 0
-    far = np.hypot(X - 8.0, Y - 8.0) > 15.0
+    far = np.hypot(X - 8.0, Y - 8.0) > 22.0
     np.testing.assert_array_equal(made[:441][far], at[:441][far])
 
 
@@ -41,3 +41,19 @@ def test_only_skin_that_is_asked_about_goes_back_and_none_where_the_stiffer_map_
     assert uncrossed(at, REST, REST, TRIANGLES, ~ABLE) is at
     assert uncrossed(at, at.copy(), REST, TRIANGLES, ABLE) is at
     assert uncrossed(REST, at, REST, TRIANGLES, ABLE) is REST
+
+
+def test_what_lies_between_places_that_cross_goes_back_with_them_and_the_end_is_gentle() -> None:
+    """An ear that hair hides crosses in a few places; of the rest of it the scan says as little."""
+    at = REST + 5.0 * np.eye(3)[0]
+    for angle in 2.0 * np.pi * np.arange(6) / 6:
+        far = (X - 5.0 * np.cos(angle)) ** 2 + (Y - 5.0 * np.sin(angle)) ** 2
+        at[:441, 2] -= 4.0 * np.exp(-far / 2.0)
+    still = REST + 5.5 * np.eye(3)[0]
+    made = uncrossed(at, still, REST, TRIANGLES, ABLE)
+    assert crossed(made) == 0
+    out = np.hypot(X, Y)
+    np.testing.assert_allclose(made[441:][out < 8.0], still[441:][out < 8.0])
+    along = made[441:][(Y == 0.0) & (X > 0.0), 0] - at[441:][(Y == 0.0) & (X > 0.0), 0]
+    assert np.abs(np.diff(along)).max() < 0.2, "no step at the edge"
+    np.testing.assert_array_equal(made[441:][out > 27.0], at[441:][out > 27.0])
