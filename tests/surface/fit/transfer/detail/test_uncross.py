@@ -13,11 +13,12 @@ TRIANGLES = np.vstack([ONE, ONE[:, ::-1] + 441])
 UPPER, LOWER = (np.column_stack([X, Y, np.full(441, z)]) for z in (2.0, 0.0))
 REST = np.vstack([UPPER, LOWER])
 ABLE = np.ones(len(REST), bool)
+PART = np.zeros(len(TRIANGLES), np.int64)
 
 
 def crossed(at: np.ndarray) -> int:
     same = np.arange(len(REST))
-    return len(crossing(Crossings(at, TRIANGLES, same, 0 * TRIANGLES[:, 0], np.ones((1, 1), bool)), at, ABLE))
+    return len(crossing(Crossings(at, TRIANGLES, same, 0 * TRIANGLES[:, 0], np.ones((1, 1), bool)), at, REST, ABLE))
 
 
 def dented() -> np.ndarray:
@@ -30,7 +31,7 @@ def dented() -> np.ndarray:
 def test_skin_that_crosses_goes_back_and_the_rest_stays() -> None:
     at, still = dented(), REST + 5.5 * np.eye(3)[0]
     assert crossed(at) > 10
-    made = uncrossed(at, still, REST, TRIANGLES, ABLE)
+    made = uncrossed(at, still, REST, TRIANGLES, PART, ABLE)
     assert crossed(made) == 0
     far = np.hypot(X - 8.0, Y - 8.0) > 22.0
     np.testing.assert_array_equal(made[:441][far], at[:441][far])
@@ -38,9 +39,9 @@ def test_skin_that_crosses_goes_back_and_the_rest_stays() -> None:
 
 def test_only_skin_that_is_asked_about_goes_back_and_none_where_the_stiffer_map_is_no_better() -> None:
     at = dented()
-    assert uncrossed(at, REST, REST, TRIANGLES, ~ABLE) is at
-    assert uncrossed(at, at.copy(), REST, TRIANGLES, ABLE) is at
-    assert uncrossed(REST, at, REST, TRIANGLES, ABLE) is REST
+    assert uncrossed(at, REST, REST, TRIANGLES, PART, ~ABLE) is at
+    assert uncrossed(at, at.copy(), REST, TRIANGLES, PART, ABLE) is at
+    assert uncrossed(REST, at, REST, TRIANGLES, PART, ABLE) is REST
 
 
 def test_what_lies_between_places_that_cross_goes_back_with_them_and_the_end_is_gentle() -> None:
@@ -50,7 +51,7 @@ def test_what_lies_between_places_that_cross_goes_back_with_them_and_the_end_is_
         far = (X - 5.0 * np.cos(angle)) ** 2 + (Y - 5.0 * np.sin(angle)) ** 2
         at[:441, 2] -= 4.0 * np.exp(-far / 2.0)
     still = REST + 5.5 * np.eye(3)[0]
-    made = uncrossed(at, still, REST, TRIANGLES, ABLE)
+    made = uncrossed(at, still, REST, TRIANGLES, PART, ABLE)
     assert crossed(made) == 0
     out = np.hypot(X, Y)
     np.testing.assert_allclose(made[441:][out < 8.0], still[441:][out < 8.0])
