@@ -193,7 +193,6 @@ class Registration:
         held = STILL + (FAR - STILL) * far[:, 0]
         return np.where(found[:, None], goals, place), np.where(found, weight, held)
 
-
     def _placed(self, points: Floats, goals: Floats, found: Bools, whole: ScaleShift) -> Floats:
         """(n, 3) where points (n, 3) lie by the scale and shift of all matches, and of the neck's below it."""
         placed, neck = whole.points(points), self._template.neck
