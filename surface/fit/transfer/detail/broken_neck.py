@@ -1,8 +1,8 @@
 """Find where a closed scan ends below: the cut, or break, of its neck, which is no skin.
 
 Seen from below, it is what lies around the neck's axis without a step: the underside of the jaw, which faces down, too,
-lies a step higher. Behind the axis, what faces down below the chin is no skin, either: sculptors cut the nape off on the
-slant, and a nape widens downwards.
+lies a step higher. Behind the axis, what faces down below the chin is no skin, either: sculptors cut the nape off on
+the slant, and a nape widens downwards.
 """
 
 from __future__ import annotations

@@ -19,6 +19,7 @@ BACK_MM = (3.0, 8.0)  # distance from what crosses up to which skin goes back fu
 TOGETHER_MM = 10.0  # places that cross and are no further apart belong together
 WIDER, WIDEST_MM = 1.5, 30.0  # radius of what goes back as a whole, in theirs; the greatest
 NEXT_MM = 4.0  # at rest, between the middles of triangles on both sides of a seam
+FEWEST = 8  # vertices of a place that crosses; fewer are a seam's corner, which nobody sees
 HOPELESS_MM = 6.0  # at rest, from what crosses where it would go back to
 SAME = 1e-6  # vertices that are nearer at rest, relative to the skin's size, are in one place
 
@@ -26,24 +27,25 @@ SAME = 1e-6  # vertices that are nearer at rest, relative to the skin's size, ar
 def uncrossed(at: Floats, still: Floats, rest: Floats, triangles: Ints, part: Ints, able: Bools) -> Floats:
     """The skin's vertices ``at (n, 3)``, moved towards ``still (n, 3)`` where triangles (t, 3) pass through each other.
 
-    still : the same vertices by a stiffer map. rest : (n, 3) on the head that the skin comes from. part : (t,) number of
-    the part of skin that each triangle belongs to. able : (n,) which of the vertices that cross are asked about. Where
-    more would cross afterwards than before, nothing moves.
+    still : the same vertices by a stiffer map. rest : (n, 3) on the head that the skin comes from. part : (t,) number
+    of the part of skin that each triangle belongs to. able : (n,) which of the vertices that cross are asked about;
+    none near what crosses at rest or by the stiffer map, too. Where more would cross afterwards than before, nothing
+    moves.
     """
     size = float(np.ptp(rest, axis=0).max()) or 1.0
     same = np.unique(np.round(rest / (SAME * size)), axis=0, return_inverse=True)[1].reshape(-1)
     kinds = int(part.max(initial=0)) + 1
     found = Crossings(rest, triangles, same, part, np.ones((kinds, kinds), bool))
     able = able & ~_near_any(rest, [crossing(found, as_is, rest, np.ones_like(able)) for as_is in (rest, still)])
-    first = crossing(found, at, rest, able)
+    first = _places(found, at, rest, able)
     crossed, out = np.zeros(len(at), bool), at
     for _ in range(ROUNDS):
-        more = first if out is at else crossing(found, out, rest, able)
+        more = first if out is at else _places(found, out, rest, able)
         if not len(more):
             break
         crossed[more] = True
         out = at + _share(rest, rest[crossed])[:, None] * (still - at)
-    return out if len(crossing(found, out, rest, able)) < len(first) else at
+    return out if len(_places(found, out, rest, able)) < len(first) else at
 
 
 def crossing(found: Crossings, at: Floats, rest: Floats, able: Bools) -> Ints:
@@ -55,6 +57,16 @@ def crossing(found: Crossings, at: Floats, rest: Floats, able: Bools) -> Ints:
     seam = beside & (found.kind[pairs[:, 0]] != found.kind[pairs[:, 1]])
     ids: Ints = np.unique(triangles[pairs[~seam].ravel()])
     return ids[able[ids]]
+
+
+def _places(found: Crossings, at: Floats, rest: Floats, able: Bools) -> Ints:
+    """Those of :func:`crossing`, of which there are enough about one place."""
+    ids = crossing(found, at, rest, able)
+    if not len(ids):
+        return ids
+    group = joined_nearer(rest[ids], np.arange(len(ids)), TOGETHER_MM)
+    out: Ints = ids[np.bincount(group)[group] >= FEWEST]
+    return out
 
 
 def _near_any(points: Floats, rows: list[Ints]) -> Bools:

@@ -39,7 +39,7 @@ def test_the_lowest_matches_count_and_what_lies_above_the_neck_does_not() -> Non
     goals = WHOLE.points(points) + OFF * np.where(points[:, 1:2] < -40.0, 1.0, 0.0)
     place = neck_place(points, goals, points[:, 1] > -55.0, NECK, WHOLE)
     assert 4.0 < (place.shift - WHOLE.shift)[0] < 9.0
-    head = np.concatenate([points, points + [0.0, 80.0, 0.0]])
+    head = np.concatenate([points, points + np.array([0.0, 80.0, 0.0])])
     far = np.concatenate([goals, WHOLE.points(points) + 500.0])
     every = neck_place(head, far, np.append(points[:, 1] > -55.0, np.ones(len(points), bool)), NECK, WHOLE)
     np.testing.assert_allclose(every.shift, place.shift, atol=1e-9)

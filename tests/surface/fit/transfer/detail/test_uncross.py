@@ -58,3 +58,19 @@ def test_what_lies_between_places_that_cross_goes_back_with_them_and_the_end_is_
     along = made[441:][(Y == 0.0) & (X > 0.0), 0] - at[441:][(Y == 0.0) & (X > 0.0), 0]
     assert np.abs(np.diff(along)).max() < 0.2, "no step at the edge"
     np.testing.assert_array_equal(made[441:][out > 27.0], at[441:][out > 27.0])
+
+
+def test_two_skins_go_back_where_they_cross_but_not_along_their_seam() -> None:
+    """The same sheets as two parts: both are 2 mm apart everywhere, as skins are on both sides of a seam."""
+    at, still = dented(), REST + 5.5 * np.eye(3)[0]
+    two = np.repeat([0, 1], len(ONE))
+    assert uncrossed(at, still, REST, TRIANGLES, two, ABLE) is at
+    apart = REST + np.where(np.arange(len(REST))[:, None] < 441, [0.0, 0.0, 4.0], 0.0)
+    assert uncrossed(at, still, apart, TRIANGLES, two, ABLE) is not at
+
+
+def test_a_few_vertices_and_what_crosses_where_it_would_go_back_to_stay() -> None:
+    at, still = dented(), REST + 5.5 * np.eye(3)[0]
+    few = np.append(np.hypot(X - 8.0, Y - 8.0) < 2.5, np.zeros(441, bool))
+    assert uncrossed(at, still, REST, TRIANGLES, PART, few) is at
+    assert uncrossed(at, at + 0.5 * np.eye(3)[0], REST, TRIANGLES, PART, ABLE) is at
