@@ -22,12 +22,13 @@ STEP_MM = 2.0  # greatest step between neighbouring pixels of the end
 FROM_BELOW = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # x, z and depth
 SLANT = -0.3  # y of normals behind the axis below which samples are no nape
 LEAST = 0.002  # share of all samples that a slanting end has
-RIM_MM = 6.0  # beside the end, where the skin already turns to it: no detail that a neck has
+RIM_MM = 6.0  # beside a slanting end, where the nape already turns to it: no detail that a neck has
 NEAR_MM = 1.5  # samples that lie so near to what is seen belong to it
 
 
 def without_end(samples: Samples, scan: Scan, axis: Floats, chin: float) -> Samples:
-    """The samples of a scan, but for those on the end of its neck; those beside it lie at a border.
+    """The samples of a scan, but for those on the end of its neck; those beside a slanting end lie at a
+    border.
 
     axis : (3,) a point of the neck's axis, inside. chin : height of the chin, mm: the end lies below it. All in the
     head's frame.
@@ -45,8 +46,8 @@ def without_end(samples: Samples, scan: Scan, axis: Floats, chin: float) -> Samp
     own = samples.points @ FROM_BELOW.T
     column, row = _pixels(own, x0, z0, picture.depth.shape)
     on = end[row, column] & (np.abs(own[:, 2] - picture.depth[row, column]) < NEAR_MM) & (samples.normals[:, 1] < 0.0)
-    on |= _slanting(samples, axis, chin)
-    return _with_border(samples.kept(~on), samples.points[on])
+    slant = _slanting(samples, axis, chin)
+    return _with_border(samples.kept(~(on | slant)), samples.points[slant & ~on])
 
 
 def _slanting(samples: Samples, axis: Floats, chin: float) -> Bools:
@@ -57,7 +58,7 @@ def _slanting(samples: Samples, axis: Floats, chin: float) -> Bools:
 
 
 def _with_border(samples: Samples, end: Floats) -> Samples:
-    """The samples, of which those near points ``end (k, 3)`` lie at a border."""
+    """The samples, of which those near points ``end (k, 3)`` lie at a border, so that nothing is matched to them."""
     if not len(end) or not len(samples.points):
         return samples
     beside = cKDTree(end).query(samples.points, distance_upper_bound=RIM_MM)[0] < RIM_MM

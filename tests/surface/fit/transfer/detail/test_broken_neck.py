@@ -99,10 +99,18 @@ def test_a_nape_that_faces_down_in_a_spot_stays():
     assert len(without_end(turned, scan, AXIS, CHIN).points) == len(turned.points)
 
 
-def test_samples_beside_the_end_lie_at_a_border():
-    """There the skin already turns to the end."""
-    samples, kept = left(stump(30.0)[0])
-    above = (np.hypot(*kept.points[:, [0, 2]].T) < 20.5) & (kept.points[:, 2] > 5.0)
-    height = kept.points[above, 1] + 40.0 - 0.3 * kept.points[above, 2]
-    assert kept.border[above][height < 4.0].all() and not kept.border[above][height > 8.0].any()
-    assert not samples.border[np.hypot(*samples.points[:, [0, 2]].T) < 40.0].any()
+def test_samples_beside_a_slanting_end_lie_at_a_border():
+    """There the nape already turns to the end; of a stump each millimetre is needed."""
+    scan = wedge(-2.0)
+    samples = sample(scan, 40_000)
+    nape = samples.points[:, 2] < -20.0
+    samples.normals[nape] = [0.0, 0.5, -np.sqrt(0.75)]
+    kept = without_end(samples, scan, AXIS, CHIN)
+    above = kept.points[:, 2] < -20.0
+    far = np.sqrt(5.0) * (-20.0 - kept.points[above, 2])  # along the slant
+    assert above.sum() == nape.sum()
+    assert kept.border[above][far < 5.0].all()
+    inner = (np.abs(kept.points[above, 0]) < 30.0) & (far > 7.0) & (far < 40.0)  # the sheet has edges of its own
+    assert not kept.border[above][inner].any()
+    stub = left(stump(30.0)[0])[1]
+    assert not stub.border[(np.hypot(*stub.points[:, [0, 2]].T) < 20.5) & (stub.points[:, 2] > 7.0)].any()
