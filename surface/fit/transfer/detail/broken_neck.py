@@ -21,7 +21,7 @@ PIXEL_MM = 1.5
 STEP_MM = 2.0  # greatest step between neighbouring pixels of the end
 FROM_BELOW = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # x, z and depth
 SLANT = -0.3  # y of normals behind the axis below which samples are no nape
-LEAST = 0.002  # share of all samples that a slanting end has
+LEAST = 0.01  # share of all samples that a slanting end has
 RIM_MM = 6.0  # beside a slanting end, where the nape already turns to it: no detail that a neck has
 NEAR_MM = 1.5  # samples that lie so near to what is seen belong to it
 
@@ -46,15 +46,17 @@ def without_end(samples: Samples, scan: Scan, axis: Floats, chin: float) -> Samp
     own = samples.points @ FROM_BELOW.T
     column, row = _pixels(own, x0, z0, picture.depth.shape)
     on = end[row, column] & (np.abs(own[:, 2] - picture.depth[row, column]) < NEAR_MM) & (samples.normals[:, 1] < 0.0)
-    slant = _slanting(samples, axis, chin)
-    return _with_border(samples.kept(~(on | slant)), samples.points[slant & ~on])
+    slant = _slanting(samples, axis, chin) & ~on
+    if slant.mean() < LEAST:  # some of a break that is rough
+        return samples.kept(~on)
+    return _with_border(samples.kept(~(on | slant)), samples.points[slant])
 
 
 def _slanting(samples: Samples, axis: Floats, chin: float) -> Bools:
     """(m,) which samples behind the neck's axis face down."""
     at = samples.points
     down: Bools = (at[:, 1] < chin) & (at[:, 2] < axis[2]) & (samples.normals[:, 1] < SLANT)
-    return down if down.mean() > LEAST else np.zeros(len(at), bool)
+    return down
 
 
 def _with_border(samples: Samples, end: Floats) -> Samples:

@@ -93,9 +93,9 @@ def test_a_nape_that_faces_down_in_a_spot_stays():
     heights = np.full((91, 91), -40.0)
     scan = scan_of(heights + 3.0 * np.maximum(0.0, 45.0 - np.arange(91))[:, None])
     samples = sample(scan, 40_000)
-    up = np.where(np.hypot(samples.points[:, 0], samples.points[:, 2] + 30.0) < 1.5, -0.5, 0.5)
+    up = np.where(np.hypot(samples.points[:, 0], samples.points[:, 2] + 30.0) < 3.0, -0.5, 0.5)
     turned = Samples(samples.points, np.column_stack([0 * up, up, np.sqrt(1 - up**2)]), samples.border)
-    assert 0 < (up < 0.0).mean() < 0.002
+    assert 0 < (up < 0.0).mean() < 0.01
     assert len(without_end(turned, scan, AXIS, CHIN).points) == len(turned.points)
 
 
