@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from surface.base.arrays import Floats, Ints
+from surface.base.arrays import Bools, Ints
 from surface.check.crossings import Crossings
 from surface.check.overlaps import LINING, MAX_DEPTH_MM, MIN_DEPTH_MM, Overlap
-from surface.fit.measures.dense import FittedPart, faces_of
+from surface.fit.measures.dense import faces_of
 from surface.fit.measures.mesh_pose import displacement
-from surface.fit.points.report import NEUTRAL
+from surface.fit.points.report import NEUTRAL, FittedPart
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.head.model.data import HeadData
 
@@ -51,7 +51,7 @@ class MeshOverlaps:
         return float(depth[near].max(initial=0.0))
 
 
-def _triangles(mesh: FitMesh, faces: Sequence[Floats]) -> Ints:
+def _triangles(mesh: FitMesh, faces: Sequence[Bools]) -> Ints:
     """(t, 3) triangles of the faces that any of some masks (f,) choose."""
     chosen = np.any([*faces, np.zeros(len(mesh.faces), bool)], axis=0)
     return triangles(mesh.faces[chosen])
