@@ -8,7 +8,7 @@ the lining, a lip that reaches a little into the other would be as deep in it as
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,13 +42,15 @@ WORDS = {"skin": "itself", "eye": "the eyeball", "teeth": "the teeth"}
 
 @dataclass(frozen=True)
 class Overlap:
-    """How deep skin lies behind a material in a shape ("" at rest), mm, and where, in words; ``limit`` : mm."""
+    """How deep skin lies behind a material in a shape ("" at rest), mm, and where, in words; ``limit`` : mm. at : (3,)
+    the place at rest."""
 
     mm: float
     material: str
     shape: str
     place: str
     limit: float
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __str__(self) -> str:
         shape = f"shape {self.shape}" if self.shape else "the neutral face"
@@ -74,11 +76,19 @@ def overlapping(subject: Subject, places: Places) -> Iterator[Finding]:
             yield Finding("overlap", text, hint, warning=one.material == "skin")
 
 
-def overlap_notes(head: HeadData) -> list[str]:
-    """Return the deepest overlap of a head's skin with each material, in words; none where all are shallow."""
+def overlap_notes(head: HeadData, in_mesh: Callable[[Overlap], float] = lambda _: 0.0) -> list[str]:
+    """Return the deepest overlap of a head's skin with each material, in words; none where all are shallow.
+
+    in_mesh : how deep the same overlap is in the mesh that the head was fitted to, mm; 0 where it has none.
+    """
     subject = Subject(Head(head))
     found = overlaps(subject, Places(subject, find_mouth(subject)))
-    return [str(one) for one in found if one.mm > MIN_REPORTED_MM * subject.scale]
+    return [_told(one, in_mesh(one)) for one in found if one.mm > MIN_REPORTED_MM * subject.scale]
+
+
+def _told(overlap: Overlap, in_mesh: float) -> str:
+    """Return an overlap in words, with how deep it is in the mesh where that has it, too."""
+    return f"{overlap}; in the mesh itself {in_mesh:.1f} mm" if in_mesh > 0.0 else str(overlap)
 
 
 class _Body:
@@ -133,7 +143,9 @@ class _Body:
             else:
                 self._at_rest[kind][rows] = depth
             if (row := self._deepest(rows, depth)) is not None:
-                yield Overlap(float(depth[row]), material, shape, places.name(self._rest[rows[row]]), limit * scale)
+                x, y, z = self._rest[rows[row]].tolist()
+                place = places.name(self._rest[rows[row]])
+                yield Overlap(float(depth[row]), material, shape, place, limit * scale, (x, y, z))
 
     def _deepest(self, rows: Ints, depth: Floats) -> int | None:
         """Return the place among vertices (k,) whose depth is exceeded over enough area about one place; None where

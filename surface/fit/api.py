@@ -32,6 +32,7 @@ from surface.fit.features.wrinkles import with_deep_wrinkles
 from surface.fit.filling.api import Filling, filled
 from surface.fit.measures.dense import errors_at_rest
 from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
+from surface.fit.measures.own_overlaps import MeshOverlaps
 from surface.fit.measures.refusal import save_or_refuse
 from surface.fit.points.facets import facet_sag
 from surface.fit.points.importance import POINTS_PER_EYE as MORE_POINTS
@@ -176,7 +177,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     head = with_greatest_error(head, str(dense.greatest) if dense.greatest else "")
     notes = [*worn.notes, *loaded.notes, *plan.notes, *turned_faces(mesh), *mended]
     notes += findings(head, loaded.marks, _kinds(loaded), {one.kind for one in worn.accessories})
-    notes += overlap_notes(head)
+    notes += overlap_notes(head, MeshOverlaps(head, mesh, sources, fitted_parts, scale).depth)
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
         loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets,

@@ -16,7 +16,8 @@ from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.transfer.align import thinned
-from surface.fit.transfer.place_parts import fit_scale_shift
+from surface.fit.transfer.detail.below_neck import neck_place, neck_share
+from surface.fit.transfer.place_parts import ScaleShift, fit_scale_shift
 from surface.fit.transfer.relief import Finder
 from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.template import Template
@@ -180,16 +181,25 @@ class Registration:
         """Goals (n, 3) and weights (n,) of all nodes.
 
         Nodes without a match stay where a stiffer map put them. Those far from every match, such as the back of a head
-        of which only the face was scanned, follow the scale and shift of all matches.
+        of which only the face was scanned, follow the scale and shift of all matches; below the end of a neck, those
+        of the neck.
         """
         points = self._template.points[self._nodes]
         if found.sum() < 4:
             return points, weight
         whole = fit_scale_shift(points[found], goals[found])
         far = smoothstep(cKDTree(points[found]).query(points)[0], *FAR_MM)[:, None]
-        place = (1.0 - far) * self._stiffer(points) + far * whole.points(points)
+        place = (1.0 - far) * self._stiffer(points) + far * self._placed(points, goals, found, whole)
         held = STILL + (FAR - STILL) * far[:, 0]
         return np.where(found[:, None], goals, place), np.where(found, weight, held)
+
+    def _placed(self, points: Floats, goals: Floats, found: Bools, whole: ScaleShift) -> Floats:
+        """(n, 3) where points (n, 3) lie by the scale and shift of all matches, and of the neck's below it."""
+        placed, neck = whole.points(points), self._template.neck
+        if neck is None:
+            return placed
+        share = neck_share(points, neck)[:, None]
+        return (1.0 - share) * placed + share * neck_place(points, goals, found, neck, whole).points(points)
 
 
 def register(

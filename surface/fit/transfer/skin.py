@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -98,12 +99,13 @@ class Skin:
         sheet = Sheet(self.mesh.triangles, self._steps, self._free)
         self.at = cover(sheet, self.at, ~on, samples.points, samples.normals)
 
-    def uncross(self, smooth: Warp, samples: Samples, scale: float) -> None:
-        """Move skin that passes through itself to where a stiffer map puts it, except at the samples of the scan's
-        front and at the rims of openings."""
+    def may_go_back(self, samples: Samples, scale: float) -> Bools:
+        """(n,) which vertices may go back to where a stiffer map puts them: not those at the samples of the scan's
+        front, nor those at the rims of openings."""
         tree = cKDTree(samples.points) if len(samples.points) else None
         beside = np.ones(len(self.at), bool) if tree is None else tree.query(self.at)[0] > FRONT_MM * scale
-        self.at = uncrossed(self.at, smooth(self.rest), self.rest, self.mesh.triangles, beside & self._free)
+        out: Bools = beside & self._free
+        return out
 
     def pull(self, ids: Ints, places: Floats) -> None:
         """Move vertices ``ids (k,)`` to ``places (k, 3)``, and the skin around them smoothly with them."""
@@ -156,6 +158,19 @@ class Skin:
         fitted = fit_points(part, self.mesh, self.at, self._seen, jaw, self._weight)
         self.surface, self.points, self.at = fitted.surface, fitted.points, fitted.at
         return fitted.part
+
+
+def uncross(skins: Sequence[Skin], smooth: Warp, samples: Samples, scale: float) -> None:
+    """Move skin that passes through itself to where a stiffer map puts it: an ear's front and its back are skins of
+    their own. Arguments are as those of :meth:`Skin.may_go_back`, ``smooth`` the stiffer map."""
+    first = np.cumsum([0, *(len(s.at) for s in skins)])
+    at, rest = (np.concatenate(rows) for rows in ([s.at for s in skins], [s.rest for s in skins]))
+    triangles = np.concatenate([s.mesh.triangles + n for s, n in zip(skins, first, strict=False)])
+    part = np.repeat(np.arange(len(skins)), [len(s.mesh.triangles) for s in skins])
+    able = np.concatenate([s.may_go_back(samples, scale) for s in skins])
+    out = uncrossed(at, smooth(rest), rest, triangles, part, able)
+    for skin, low, high in zip(skins, first, first[1:], strict=False):
+        skin.at = out[low:high]
 
 
 def _solved(system: csc_matrix, right: Floats) -> Floats:

@@ -13,6 +13,7 @@ import numpy as np
 from surface.base.arrays import Bools, Floats, Ints
 from surface.base.errors import FitError
 from surface.head import Contact, Head, HeadData, HeadPart
+from surface.head.model.data import Neck
 
 SIDES = ("left", "right")
 NAMES = (
@@ -32,7 +33,7 @@ class Template:
     face : (n,) whether a point belongs to the part of skin that has the openings. eye : (n,) 0 or 1 on the front of the
     left or right eyeball, else -1.
     landmarks : places (3,) by the names of :data:`NAMES`. eyes : (2, 3) centres of the eyeballs, mm. radius : of each
-    eyeball, mm.
+    eyeball, mm. neck : how the head's neck bends; None where nothing is known of one.
     """
 
     points: Floats
@@ -43,6 +44,7 @@ class Template:
     landmarks: dict[str, Floats]
     eyes: Floats
     radius: float
+    neck: Neck | None = None
 
     @property
     def height(self) -> float:
@@ -69,7 +71,7 @@ def make_template(head: Head, where: str) -> Template:
     points, normals, _, face, eye = (np.concatenate([r[k] for r in rows]) for k in range(5))
     triangles = np.concatenate([r[2] + k for r, k in zip(rows, first, strict=False)])
     marks = find_landmarks(head, contacts)
-    return Template(points, normals, triangles, face, eye, marks, data.eyes.copy(), data.eye_radius)
+    return Template(points, normals, triangles, face, eye, marks, data.eyes.copy(), data.eye_radius, data.neck)
 
 
 def _visible_surface(part: HeadPart, data: HeadData, face: str) -> tuple[Floats, Floats, Ints, Bools, Ints]:

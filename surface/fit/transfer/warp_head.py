@@ -17,7 +17,16 @@ from surface.fit.transfer.eye_depth import at_scan_depth
 from surface.fit.transfer.place_parts import behind_skin, place_eyes, place_jaw, place_neck, place_teeth
 from surface.fit.transfer.register import Matcher
 from surface.fit.transfer.scan import Samples
-from surface.fit.transfer.skin import Ball, Skin, behind_lids, close_lips, follow_skin, rims_of, seat_on_eyeballs
+from surface.fit.transfer.skin import (
+    Ball,
+    Skin,
+    behind_lids,
+    close_lips,
+    follow_skin,
+    rims_of,
+    seat_on_eyeballs,
+    uncross,
+)
 from surface.fit.transfer.template import Template
 from surface.fit.transfer.warp import Warp
 from surface.head import Contact, Group, Head, HeadData, PartData
@@ -97,11 +106,11 @@ def _skins(
             skin.follow(matcher, scale)
             if part.name == lips.part:
                 skin.cover(matcher, front, scale)
-                skin.uncross(smooth, front, scale)
             out[part.name] = skin
     sides = sides_of({p.name: p for p in head.parts if p.name in out}, head.data.seams)
     for name, (ids, places) in brought_together({n: skin.at for n, skin in out.items()}, sides).items():
         out[name].pull(ids, places)
+    uncross(list(out.values()), smooth, front, scale)
     return out
 
 

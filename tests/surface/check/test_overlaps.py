@@ -129,6 +129,7 @@ def test_a_note_says_what_is_deeper_than_a_millimetre(monkeypatch: pytest.Monkey
         notes = overlap_notes(head)
         assert len(notes) == named
     assert "mm: skin passes through the teeth: the neutral face, " in notes[0]
+    assert overlap_notes(head, lambda one: 2.0 * one.limit) == [f"{notes[0]}; in the mesh itself 4.0 mm"]
     assert str(Overlap(2.345, "eye", "jawOpen", "left eye", 2.0)) == (
         "2.3 mm: skin passes through the eyeball: shape jawOpen, left eye"
     )

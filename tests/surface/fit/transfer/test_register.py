@@ -9,8 +9,10 @@ import pytest
 from scipy.spatial import cKDTree
 
 from surface.fit.transfer import register as module
+from surface.fit.transfer.place_parts import ScaleShift
 from surface.fit.transfer.register import STAGES, Matcher, Registration, Stage, choose_nodes, register
 from surface.fit.transfer.scan import Samples
+from surface.head.model.data import Neck
 
 Z = np.array([0.0, 0.0, 1.0])
 
@@ -226,3 +228,18 @@ def test_a_known_map_is_found_between_a_template_and_a_scan(face, monkeypatch) -
     tree = cKDTree(moved.points)
     off = [tree.query(w(face.points[inner]))[0].mean() for w in (warp, smooth, lambda p: p)]
     assert off[0] < 1.3 < off[2] and off[0] < off[1] < off[2]
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_what_is_below_the_end_of_a_neck_follows_that_end(face, monkeypatch, known: bool) -> None:
+    """Where the head's neck is known; the end stands 12 mm further forward than the rest of the head."""
+    own = replace(face, neck=Neck((0.0, 0.0, 0.0), 0.0, -100.0, -20.0) if known else None)
+    run = made(own, monkeypatch, made_face.samples(50))
+    angle, y = (a.ravel() for a in np.meshgrid(np.arange(24) * np.pi / 12, np.arange(-300.0, 100.0, 5.0)))
+    points = np.column_stack([50.0 * np.sin(angle), y, 50.0 * np.cos(angle)])
+    found = y > -60.0
+    goals = np.where(found[:, None], points + 12.0 * Z, 0.0)
+    placed = run._placed(points, goals, found, ScaleShift(1.0, np.zeros(3)))
+    forward = (placed - points)[:, 2]
+    np.testing.assert_allclose(forward[y < -20.0], 12.0 if known else 0.0, atol=1e-9)
+    np.testing.assert_allclose(forward[y >= 0.0], 0.0, atol=1e-9)

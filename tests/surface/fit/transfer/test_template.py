@@ -8,7 +8,9 @@ import pytest
 
 from surface.base.errors import FitError
 from surface.fit.transfer.template import NAMES, find_landmarks, make_template
+from surface.head.model.data import Neck
 
+NECK = Neck((0.0, -55.0, -5.0))
 RIMS = {"lips": ((0, -38), 22, 5), "left_lids": ((33, 36), 13, 6), "right_lids": ((-33, 36), 13, 6)}
 
 
@@ -49,7 +51,9 @@ def ball(name, follows, centre):
 def head(contacts=("lips", "left_lids", "right_lids"), radius=12.0, more=(), flipped=False):
     parts = [part("face"), ball("eye_left", "left_eye", made_face.EYES[0]),
              ball("eye_right", "right_eye", made_face.EYES[1]), *more]  # fmt: skip
-    data = SimpleNamespace(contacts=[contact(n, flipped) for n in contacts], eye_radius=radius, eyes=made_face.EYES)
+    data = SimpleNamespace(
+        contacts=[contact(n, flipped) for n in contacts], eye_radius=radius, eyes=made_face.EYES, neck=NECK
+    )
     posed = []
     made = SimpleNamespace(parts=parts, data=data, posed=posed, name="x", values=lambda v: v, pose=posed.append)
     made.part = lambda name: next(p for p in parts if p.name == name)
@@ -82,7 +86,7 @@ def test_what_can_be_seen_is_skin_and_the_fronts_of_the_eyes() -> None:
     more = [part("brow", shift=(0, 0, 3)), part("sockets"), part("teeth", "jaw", "teeth"), part("hair", "skin", "hair")]
     own = head(more=more)
     made = make_template(own, "x")
-    assert own.posed == [{}]
+    assert own.posed == [{}] and made.neck is NECK
     skin = 2 * 141 * 201
     assert (made.eye < 0).sum() == skin and made.face.sum() == skin / 2
     for side in (0, 1):

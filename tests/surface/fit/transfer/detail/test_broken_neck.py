@@ -35,9 +35,10 @@ def left(scan, *, axis=AXIS, chin=CHIN):
 
 
 def share(samples, kept, radius, outside=False):
-    """Of the samples within a radius about the axis, or outside it, the share that is kept."""
-    far = [np.hypot(*s.points[:, [0, 2]].T) for s in (samples, kept)]
-    inside = [(f > radius) if outside else (f < radius) for f in far]
+    """Of the samples within a radius about the axis, or outside it, the share that is kept; before the axis, because
+    behind it nothing that faces down is."""
+    far = [(np.hypot(*s.points[:, [0, 2]].T), s.points[:, 2] > 0.0) for s in (samples, kept)]
+    inside = [before & ((f > radius) if outside else (f < radius)) for f, before in far]
     return inside[1].sum() / inside[0].sum()
 
 
@@ -72,3 +73,44 @@ def test_a_scan_without_triangles_keeps_its_samples():
     scan, _ = stump(8.0)
     samples = sample(scan, 100)
     assert without_end(samples, scan.kept(np.zeros(len(scan.triangles), bool)), AXIS, CHIN) is samples
+
+
+def wedge(slope):
+    """A nape that ends ``slope`` mm deeper for each mm it goes forward, over a throat that ends flat."""
+    z = np.arange(91) - 45
+    return scan_of(np.tile(-25.0 + slope * np.minimum(z + 45, 45)[:, None], (1, 91)))
+
+
+def test_a_nape_that_is_cut_off_on_the_slant_is_left_out_however_steep_it_is():
+    for slope in (-1.0, -2.5):
+        samples, kept = left(wedge(slope))
+        behind = [s.points[:, 2] < -3.0 for s in (samples, kept)]
+        assert behind[1].sum() < 0.02 * behind[0].sum()
+
+
+def test_a_nape_that_faces_down_in_a_spot_stays():
+    """As a lock of hair does."""
+    heights = np.full((91, 91), -40.0)
+    scan = scan_of(heights + 3.0 * np.maximum(0.0, 45.0 - np.arange(91))[:, None])
+    samples = sample(scan, 40_000)
+    up = np.where(np.hypot(samples.points[:, 0], samples.points[:, 2] + 30.0) < 3.0, -0.5, 0.5)
+    turned = Samples(samples.points, np.column_stack([0 * up, up, np.sqrt(1 - up**2)]), samples.border)
+    assert 0 < (up < 0.0).mean() < 0.01
+    assert len(without_end(turned, scan, AXIS, CHIN).points) == len(turned.points)
+
+
+def test_samples_beside_a_slanting_end_lie_at_a_border():
+    """There the nape already turns to the end; of a stump each millimetre is needed."""
+    scan = wedge(-2.0)
+    samples = sample(scan, 40_000)
+    nape = samples.points[:, 2] < -20.0
+    samples.normals[nape] = [0.0, 0.5, -np.sqrt(0.75)]
+    kept = without_end(samples, scan, AXIS, CHIN)
+    above = kept.points[:, 2] < -20.0
+    far = np.sqrt(5.0) * (-20.0 - kept.points[above, 2])  # along the slant
+    assert above.sum() == nape.sum()
+    assert kept.border[above][far < 5.0].all()
+    inner = (np.abs(kept.points[above, 0]) < 30.0) & (far > 7.0) & (far < 40.0)  # the sheet has edges of its own
+    assert not kept.border[above][inner].any()
+    stub = left(stump(30.0)[0])[1]
+    assert not stub.border[(np.hypot(*stub.points[:, [0, 2]].T) < 20.5) & (stub.points[:, 2] > 7.0)].any()
