@@ -146,7 +146,7 @@ class ContactSolver:
         profiles = 2, columns, contact_rows(contact), 3
         self._opening = (np.zeros(profiles), np.zeros(profiles), np.zeros((2, columns)),
                          np.zeros((len(self._sides.ids), 3)), *np.zeros((2, 2, columns)))  # fmt: skip
-        trace_profiles(self._sides.samples, rows, self._sides.radius, self._opening[0])
+        trace_profiles(self._sides.samples, rows, self._sides.radius, self._sides.work[5], self._opening[0])
         find_gaps(self._opening[0], self._opening[4])
         close_nearly(self._opening[4], np.ones(columns) if contact.cling else corner_fade(columns))
         self.push = np.zeros(4 * columns * profiles[2] if lids else 2 * columns)
@@ -172,7 +172,7 @@ class ContactSolver:
         seen as :func:`.contact_kernels.find_gaps` sees it; for lips."""
         profiles = np.zeros_like(self._opening[0])
         gaps: Floats = np.zeros(profiles.shape[:2])
-        trace_profiles(self._sides.samples, self._rows, self._sides.radius, profiles)
+        trace_profiles(self._sides.samples, self._rows, self._sides.radius, self._sides.work[5], profiles)
         find_gaps(profiles, gaps)
         return gaps
 

@@ -109,9 +109,14 @@ def place_samples(
         store3(room, 0, x, y, z)
         for s in range(8 * tile, min(8 * tile + 8, len(out))):
             at = 3 * (s - 8 * tile)
-            a, b, c = room[at] + offset[s, 0], room[at + 1] + offset[s, 1], room[at + 2] + offset[s, 2]
-            out[s, 0], out[s, 1], out[s, 2] = a, b, c
-            out[s, 3] = np.sqrt(a * a + b * b + c * c) if around else c
+            for c in range(3):
+                out[s, c] = room[at + c] + offset[s, c]
+    if around:  # loops as simple as these are compiled to several samples at once
+        for s in range(len(out)):
+            out[s, 3] = np.sqrt(out[s, 0] * out[s, 0] + out[s, 1] * out[s, 1] + out[s, 2] * out[s, 2])
+    else:
+        for s in range(len(out)):
+            out[s, 3] = out[s, 2]
 
 
 @nonallocating
@@ -134,18 +139,23 @@ def angle(y: float, z: float) -> float:
 
 
 @nonallocating
-def trace_profiles(samples: Floats, rows: int, radius: float, out: Floats) -> None:
+def trace_profiles(samples: Floats, rows: int, radius: float, room: Floats, out: Floats) -> None:
     """Profiles ``out (2, k, m, 3)`` of an opening's columns as (x, height, depth), from ``samples (s, 4)``, of which
     every column has ``rows``, m of them in its profile. Height is y, or, with a ``radius`` > 0, the arc above the
-    eyeball's middle."""
+    eyeball's middle. ``room (s,)`` is scratch space."""
     _, columns, m, _ = out.shape
+    if radius > 0.0:
+        for s in range(len(samples)):
+            room[s] = radius * angle(samples[s, 1], samples[s, 2])
+    else:
+        for s in range(len(samples)):
+            room[s] = samples[s, 1]
     for side in range(2):
         for k in range(columns):
             first = (side * columns + k) * rows
             for j in range(m):
-                sample = samples[first + j]
-                height = radius * angle(sample[1], sample[2]) if radius > 0.0 else sample[1]
-                out[side, k, j, 0], out[side, k, j, 1], out[side, k, j, 2] = sample[0], height, sample[3]
+                s = first + j
+                out[side, k, j, 0], out[side, k, j, 1], out[side, k, j, 2] = samples[s, 0], room[s], samples[s, 3]
 
 
 @nonallocating
@@ -293,11 +303,14 @@ def find_heights(samples: Floats, size: float, axis: Floats, heights: Floats) ->
 
     The eye looks along ``axis (3,)``; its cornea protrudes.
     """
+    a, b, c = axis[0], axis[1], axis[2]
+    for s in range(len(samples)):  # in two loops, each of which is compiled to several samples at once
+        heights[s] = (samples[s, 0] * a + samples[s, 1] * b + samples[s, 2] * c) / max(samples[s, 3], 1e-6)
     for s in range(len(samples)):
-        depth = max(samples[s, 3], 1e-6)
-        along = (samples[s, 0] * axis[0] + samples[s, 1] * axis[1] + samples[s, 2] * axis[2]) / depth
+        along = heights[s]
         root = max(CORNEA_RADIUS**2 - CORNEA_AT**2 * (1.0 - along * along), 0.0)
-        heights[s] = depth - size * max(1.0, CORNEA_AT * along + np.sqrt(root))  # 1 beside the cornea and behind it
+        ground = size * max(1.0, CORNEA_AT * along + np.sqrt(root))  # 1 beside the cornea and behind it
+        heights[s] = max(samples[s, 3], 1e-6) - ground
 
 
 @nonallocating

@@ -134,7 +134,7 @@ def part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, w
         error = lift_once(axis, 0.0, sampling, limits, work)
         if error > 0.0:
             place_all(around, sampling, work)
-    trace_profiles(work[4], rows, radius, profiles)
+    trace_profiles(work[4], rows, radius, work[5], profiles)
     find_overlap(profiles, press, soft, overlap)
     if not around:
         push += overlap.ravel()
@@ -143,7 +143,7 @@ def part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, w
         move_points(own, overlap.ravel(), apart, np.zeros(3), radius, False, local)
         place_all(around, sampling, work)
         if around:
-            trace_profiles(work[4], rows, radius, profiles)
+            trace_profiles(work[4], rows, radius, work[5], profiles)
     return max(error, deepest)
 
 
@@ -153,7 +153,7 @@ def close_sides(seal, passes, tolerance, rows, apart, opening, push, sampling, w
     own, local = sampling[4], work[0]
     _, profiles, overlap, _, least, wanted = opening
     for k in range(passes):
-        trace_profiles(work[4], rows, 0.0, profiles)
+        trace_profiles(work[4], rows, 0.0, work[5], profiles)
         if find_closing(profiles, seal, least, wanted, k == 0, overlap) < tolerance:
             break
         push += overlap.ravel()
@@ -187,7 +187,7 @@ def part_sides(
         if seal > 0.0 and radius <= 0.0:
             close_sides(seal, SEAL_PASSES, tolerance, rows, apart, opening, push, sampling, work)
         if radius > 0.0:
-            trace_profiles(work[4], rows, radius, before)
+            trace_profiles(work[4], rows, radius, work[5], before)
         error = tolerance
         while done < passes and error >= tolerance:
             error = part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, work)

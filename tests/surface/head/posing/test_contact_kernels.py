@@ -263,7 +263,7 @@ def test_samples_are_sums_of_points_by_tiles_of_eight(around):
 def test_profiles_are_those_of_the_rows_that_can_touch(radius):
     samples = samples_at(directions(200)[:40] * 13.0)
     out = np.empty((2, 4, 3, 3))
-    trace_profiles(samples, 5, radius, out)
+    trace_profiles(samples, 5, radius, np.empty(len(samples)), out)
     own = samples.reshape(2, 4, 5, 4)[:, :, :3]
     np.testing.assert_array_equal(out[..., [0, 2]], own[..., [0, 3]])
     arc = radius * np.arctan2(own[..., 1], own[..., 2]) if radius else own[..., 1]
