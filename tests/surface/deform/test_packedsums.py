@@ -46,7 +46,7 @@ def test_pairs_are_used_where_a_register_holds_one() -> None:
 
 
 @pytest.mark.parametrize("run_sums", SUMS)
-@pytest.mark.parametrize(("first", "end"), [(0, 0), (0, 1), (2, 5), (1, 5), (0, 9), (3, 14)])
+@pytest.mark.parametrize(("first", "end"), [(0, 0), (1, 1), (0, 1), (2, 5), (1, 5), (0, 9), (3, 14)])
 def test_a_tile_sums_its_own_entries(first: int, end: int, run_sums: Callable[..., None]) -> None:
     """Two or four at a time and the rest one by one, from none to several, beginning with either of two."""
     weights, slopes, row, local = entries(14)

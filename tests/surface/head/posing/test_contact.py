@@ -498,3 +498,17 @@ def test_lips_are_not_solved_again_for_points_that_their_samples_do_not_depend_o
     fresh = moved.copy()
     ContactSolver(contact(), surface, head).apply(AHEAD, fresh)
     assert np.array_equal(fresh, again)  # to the bit
+
+
+def test_a_row_of_lips_far_from_all_others_takes_all_of_its_points() -> None:
+    given = contact()
+    places = given.places.copy()
+    rows = contact_rows(given)
+    places[:, :, rows - 1, 1] = np.array([0.99, 0.01])[:, None]
+    given = replace(given, places=places)
+    surface = lips(0.5)
+    found = lip_weights(given, surface)
+    start, ids, share = weights_at(surface, places[:, :, :rows].reshape(-1, 2))
+    for k in range(rows - 1, 2 * COLUMNS * rows, rows):
+        assert np.array_equal(found.ids[found.start[k] : found.start[k + 1]], ids[start[k] : start[k + 1]])
+        np.testing.assert_allclose(found.share[found.start[k] : found.start[k + 1]], share[start[k] : start[k + 1]])

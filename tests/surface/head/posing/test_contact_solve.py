@@ -211,9 +211,11 @@ def test_sides_are_brought_together_twice_at_most() -> None:
     np.testing.assert_allclose(sides.heights[0] - sides.heights[1], 3.0 * 0.5**2, atol=1e-5)
 
 
-def test_lids_are_lifted_off_the_eyeball_and_say_how_far_they_slid_and_rose() -> None:
-    """Arcs above the middle of the eyeball, and distances from its centre, of every sample."""
-    angles = np.array([[0.5, 0.55, 0.6], [-0.5, -0.55, -0.6]])
+@pytest.mark.parametrize(("rim", "passes"), [(0.5, 3), (0.5, 1), (-0.05, 1)])
+def test_lids_are_lifted_off_the_eyeball_and_say_how_far_they_slid_and_rose(rim: float, passes: int) -> None:
+    """Arcs above the middle of the eyeball, and distances from its centre, of every sample; also of lids that pass each
+    other, and after one pass."""
+    angles = np.array([[rim, rim + 0.05, rim + 0.1], [-rim, -rim - 0.05, -rim - 0.1]])
     x = 0.5 * (np.arange(COLUMNS) - 2.0)
     places = np.zeros((2, COLUMNS, ROWS, 3))
     depth = 12.2  # too low by 0.8
@@ -225,7 +227,7 @@ def test_lids_are_lifted_off_the_eyeball_and_say_how_far_they_slid_and_rose() ->
             )
     sides = Sides(places, radius=RADIUS, least=1.0)
     before = sides.samples.places
-    assert sides.part() >= 1
+    assert 1 <= sides.part(passes=passes) <= passes
     after = sides.samples.now
     np.testing.assert_allclose(np.linalg.norm(after, axis=1), RADIUS + 1.0, atol=1e-3)
     arc = [RADIUS * np.arctan2(each[:, 1], each[:, 2]) for each in (before, after)]

@@ -64,6 +64,20 @@ def test_a_seam_reports_what_it_wrote():
     assert all(not p.changed for p in h.parts)
 
 
+def test_a_seam_writes_to_the_arrays_that_its_parts_have_now():
+    h = head()
+    h.pose(h.values({"mouthPucker": 1.0}))
+    one, two = h.parts[:2]
+    before = two.vertices
+    two.vertices, two.normals = two.vertices + np.float32(1.0), two.normals.copy()
+    moved = two.vertices.copy()
+    one.changed = [(0, len(one.vertices))]
+    for stitch in h.stitches:
+        stitch.close()
+    assert np.abs(two.vertices - before).max() > 0.9 and (two.vertices != moved).any()
+    np.testing.assert_array_equal(two.vertices[h.stitches[0].ids], before[h.stitches[0].ids])
+
+
 def test_a_seam_off_the_border_is_none():
     data = small_head()
     far = data.seams[0].uv_a * 0.2 + 0.4
