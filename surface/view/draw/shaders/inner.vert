@@ -8,7 +8,7 @@
 #define CREVICE vec3(0.34, 0.19, 0.15)  // of the light, what is left between two teeth and at the gum
 #define OPEN_SHARE 0.55                 // of the sky that a tooth sees, from which on it is in the open
 
-#define BEHIND vec3(0.66, 0.50, 0.50)    // of the light, what the tongue leaves to the inner sides of teeth far back
+#define BEHIND vec3(0.56, 0.50, 0.49)    // of the light, what the tongue leaves to the inner sides of teeth far back
 #define BEHIND_MM vec2(2.0, 22.0)       // behind the lips: where it begins to lie before them, and where it does
 
 uniform mat4 view_projection;
@@ -54,7 +54,7 @@ void main() {
     vec3 outwards = normalize(dot(away, side) * side + (past + ARCH_MM) * out_of);
     float inwards = teeth * smoothstep(0.0, 0.5, -dot(n, outwards));
     float behind = teeth * max(deep, inwards * smoothstep(BEHIND_MM.x, BEHIND_MM.y, -past));
-    vec3 own = mix(mix(albedo, GUM, shade.y), WALLS, max(0.45 * inwards, 0.72 * behind));
+    vec3 own = mix(mix(albedo, GUM, shade.y), WALLS, max(0.16 * inwards, 0.20 * behind));
     n = normalize(mix(n, out_of, 0.55 * deep));
     vec3 tint = mix(vec3(1.0), ROUND_WALLS, max(deep, inwards));
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)
