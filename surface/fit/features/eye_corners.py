@@ -15,6 +15,7 @@ from surface.base.arrays import Floats
 from surface.fit.features.pieces import HeadRig, Skin, Strip, fit_strip, strips_part
 from surface.fit.points.refine import Fitted
 from surface.fit.source.chart import TILE, Chart
+from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import PartData, Seam
 
@@ -50,6 +51,15 @@ def corners_part(
         return None
     part = strips_part(NAME, "skin", strips, rig, (0, CHORD_MM * scale, 7))
     return replace(part, lids=np.zeros(len(part.points))), seams
+
+
+def lacks_corners(loaded: Loaded) -> bool:
+    """Whether nothing stays in a mesh that closes its corners of the eyes.
+
+    An exported head has linings of its own, or bands by this name, which are left out as all pieces of eyes are, and
+    made again.
+    """
+    return not loaded.exported or any(NAME in piece for piece in loaded.pieces)
 
 
 def flesh_paint() -> list[dict[str, object]]:

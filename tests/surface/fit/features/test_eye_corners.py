@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from surface.fit.features.eye_corners import NAME, corners_part
+from surface.fit.features.eye_corners import NAME, corners_part, lacks_corners
 from surface.head import Head
 
 SHAPES = ({}, {"eyeBlinkLeft": 1.0, "eyeBlinkRight": 1.0}, {"jawOpen": 1.0})
@@ -49,6 +49,15 @@ def test_it_is_painted_as_flesh(head: Head) -> None:
     assert [p["attribute"] for p in head.data.paint if p["part"] == NAME][-1] == "albedo"
     red, green, _ = head.part(NAME).attributes["albedo"].mean(axis=0)
     assert red > 2.0 * green
+
+
+@pytest.mark.parametrize(
+    ("exported", "pieces", "made"),
+    [(False, ("Head", "eyes"), True), (True, ("face/skin", "lids/wet"), False), (True, ("eye_corners/skin",), True)],
+)
+def test_exports_get_them_again_only_where_they_had_them(exported: bool, pieces: tuple[str, ...], made: bool) -> None:
+    kinds = dict.fromkeys(pieces, "skin")
+    assert lacks_corners(SimpleNamespace(exported=exported, pieces=kinds)) is made  # type: ignore[arg-type]
 
 
 def test_a_face_without_openings_has_none() -> None:
