@@ -3,7 +3,8 @@
 Only skin counts that can be seen from outside at rest: what lines the mouth may overlap the teeth as it likes. The
 depth of an overlap is the one that is exceeded over 10 mm² of skin: single vertices that lie deeper, as in the corners
 of mouth and eyes, are not seen. Flesh lies between skin and what lines the mouth, and is left through either: without
-the lining, a lip that reaches a little into the other would be as deep in it as the chin or the nose is away.
+the lining, a lip that reaches a little into the other would be as deep in it as the chin or the nose is away. What
+lines the lids ends inside the eyeballs, where nobody sees how it folds, and does not count either.
 """
 
 from __future__ import annotations
@@ -36,6 +37,7 @@ TOGETHER_MM = 8.0  # vertices no further apart than that lie about one place
 DEEPER_MM = 0.5  # than in the neutral face: what is less belongs to that
 AREA_MM2 = 10.0
 LINING = "mouth"  # material of what lines the mouth: flesh lies between it and the skin
+INSIDE_SHARE = 0.2  # of a part's vertices at rest: with more of them inside an eyeball, it lines the lids
 MOVED_MM = 0.1  # what moves less counts as unmoved
 WORDS = {"skin": "itself", "eye": "the eyeball", "teeth": "the teeth"}
 
@@ -91,12 +93,21 @@ def _told(overlap: Overlap, in_mesh: float) -> str:
     return f"{overlap}; in the mesh itself {in_mesh:.1f} mm" if in_mesh > 0.0 else str(overlap)
 
 
+def _lines_lids(subject: Subject, number: int) -> bool:
+    """Whether a part goes from the lids into the eyeballs."""
+    if subject.eyes is None:
+        return False
+    off = np.linalg.norm(subject.rest[number][:, None] - subject.eyes, axis=2).min(axis=1)
+    return bool((off < subject.head.data.eye_radius).mean() > INSIDE_SHARE)
+
+
 class _Body:
     """Skin, eyeballs and teeth of a head as one mesh."""
 
     def __init__(self, subject: Subject) -> None:
         self._subject, self._kinds = subject, [*LIMITS_MM, LINING]
-        drawn = [k for k, p in enumerate(subject.parts) if p.material in self._kinds and len(p.triangles)]
+        met = [k for k, p in enumerate(subject.parts) if p.material in self._kinds and len(p.triangles)]
+        drawn = [k for k in met if subject.parts[k].material != "skin" or not _lines_lids(subject, k)]
         self.numbers = drawn if any(subject.parts[k].material == "skin" for k in drawn) else []
         if not self.numbers:
             return

@@ -20,7 +20,7 @@ from surface.fit.features.blink_squints import cancel_squints_in_blinks
 from surface.fit.features.cavity import MATERIAL
 from surface.fit.features.combs import combed
 from surface.fit.features.cutouts import cut_out
-from surface.fit.features.eye_corners import corners_part, flesh_paint
+from surface.fit.features.eye_corners import corners_paint, corners_part, lacks_corners
 from surface.fit.features.findings import findings
 from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
@@ -153,11 +153,11 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     paint = make_paint(recipe.paint, charts, mesh)
     scale, seams = head_scale(mesh.vertices, dict(zip(mesh.names, mesh.deltas, strict=True))), find_seams(charts)
     bands = None
-    if plan.found and plan.found.openings and not loaded.exported:  # an export has such bands
+    if plan.found and plan.found.openings and lacks_corners(loaded):
         bands = corners_part(parts[0].name, fitted_parts[0].chart, fitted_parts[0].fitted, mesh, rig, scale)
     parts, seams = (parts, seams) if bands is None else ([*parts, bands[0]], [*seams, *bands[1]])
     paint += paint_layers(mesh, plan.found, parts) if plan.found else []
-    paint += [] if bands is None else flesh_paint()
+    paint += corners_paint(mesh, plan.found) if plan.found and bands is not None else []
     head = HeadData(
         name, _provenance(recipe), _neck(mesh, recipe, loaded.marks), rig.eyes, rig.radius, rig.jaw,
         parts, seams, paint, placement=loaded.placement,

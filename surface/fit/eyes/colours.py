@@ -44,6 +44,20 @@ class EyeColours:
     iris_radius: float
 
 
+def piece_colour(mesh: FitMesh, word: str) -> Floats | None:
+    """(3,) linear RGB of most of what has a word in its name; None where nothing has, or it has no colours."""
+    named = np.array([word in name for name in mesh.pieces], bool)
+    ids = np.flatnonzero(named[mesh.piece]) if named.any() else np.zeros(0, np.int64)
+    found = sample_colours(mesh, ids, steps=1)
+    return None if found is None else _most(found, _all(found), SKIN_RANGE)
+
+
+def white_colour(mesh: FitMesh, eyes: Eyes) -> Floats | None:
+    """(3,) linear RGB of the white of both eyes; None where the mesh has no colours there."""
+    white = [found.white for found in eye_colours(mesh, eyes) if found.white is not None]
+    return np.mean(white, axis=0) if white else None
+
+
 def skin_colour(mesh: FitMesh, skin: Bools) -> Floats | None:
     """(3,) linear RGB of most of the skin (f,) that faces front; None where the mesh has no colours there."""
     ids = np.flatnonzero(skin)

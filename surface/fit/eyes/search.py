@@ -40,7 +40,7 @@ class Eyes:
     drawn : (f,) bool, those of ``faces`` that are no sockets. skin : (f,) bool, faces of the face.
     iris : radius of the iris, mm; 0 where no piece shows it.
     openings : between the lids, left first; empty where they are not holes of the skin.
-    notes : what was found, in words.
+    notes : what was found, in words. flat : they were patches and no balls, as of drawn characters.
     """
 
     centres: Floats
@@ -51,6 +51,7 @@ class Eyes:
     iris: float = 0.0
     openings: list[Opening] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    flat: bool = False
 
 
 def find_eyes(mesh: FitMesh, skin_of: Callable[[Bools], Bools]) -> Eyes:
@@ -140,7 +141,8 @@ def _placed(mesh: FitMesh, sides: list[Side], what: str, gone: Bools, openings: 
     radius = float(np.mean([b.radius for b in balls]))
     notes = [f"{int(gone.sum())} faces are eyes ({what}), replaced by {how}"] if sides else [ADDED]
     iris = max((s.iris for s in sides), default=0.0)
-    return Eyes(np.stack([b.centre for b in balls]), radius, gone, gone, gone, iris, openings, notes)
+    patches = any(s.ball is None for s in sides)
+    return Eyes(np.stack([b.centre for b in balls]), radius, gone, gone, gone, iris, openings, notes, patches)
 
 
 def _turned(mesh: FitMesh, side: Side, index: int) -> Ball:

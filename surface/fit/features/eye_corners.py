@@ -12,11 +12,15 @@ from dataclasses import replace
 import numpy as np
 
 from surface.base.arrays import Floats
+from surface.fit.eyes.colours import piece_colour, white_colour
+from surface.fit.eyes.search import Eyes
 from surface.fit.features.pieces import HeadRig, Skin, Strip, fit_strip, strips_part
 from surface.fit.points.refine import Fitted
 from surface.fit.source.chart import TILE, Chart
+from surface.fit.source.load import Loaded
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.data import PartData, Seam
+from surface.head.posing.paint import BASE
 
 NAME = "eye_corners"  # no lining that contacts take along: they would lift its end out of the eyeball
 BACK = 0.35  # in radii: how far behind the rim the band aims
@@ -26,7 +30,8 @@ ALONG = (44, 3)  # control points along and across
 CHORD_MM = 0.2  # of a head of usual size
 FINER = 4  # samples between two places of the rim
 REACH = 1.7  # in radii, from the eye's centre to the middle of its opening
-FLESH, AMOUNT = [0.46, 0.13, 0.11], 0.75  # linear RGB, and how much of it covers the colour of skin
+FLESH, AMOUNT = [0.58, 0.25, 0.20], 0.7  # linear RGB, and how much of it covers the colour of skin
+LIGHT = 0.7  # that baked shade leaves at least
 
 
 def corners_part(
@@ -52,9 +57,32 @@ def corners_part(
     return replace(part, lids=np.zeros(len(part.points))), seams
 
 
-def flesh_paint() -> list[dict[str, object]]:
-    """The layer of paint that makes the bands flesh."""
-    return [{"part": NAME, "attribute": "albedo", "kind": "all", "value": FLESH, "amount": AMOUNT}]
+def lacks_corners(loaded: Loaded) -> bool:
+    """Whether nothing stays in a mesh that closes its corners of the eyes.
+
+    An exported head has linings of its own, or bands by this name, which are left out as all pieces of eyes are, and
+    made again.
+    """
+    return not loaded.exported or any(NAME in piece for piece in loaded.pieces)
+
+
+def corners_paint(mesh: FitMesh, eyes: Eyes) -> list[dict[str, object]]:
+    """The layers of paint that make the bands flesh; of flat eyes, as drawn characters have, the white of the eye.
+
+    An export's get the colour that they had. Baked shade finds hardly any light behind a rim, and would make a dark gap
+    of them.
+    """
+    given = piece_colour(mesh, NAME)
+    if given is None and eyes.flat:
+        found = white_colour(mesh, eyes)
+        given = np.array(BASE["sclera"]) if found is None else found
+    colour = _layer("albedo", FLESH) | {"amount": AMOUNT}
+    colour = colour if given is None else _layer("albedo", np.round(given, 4).tolist())
+    return [colour, _layer("occlusion_floor", [LIGHT])]
+
+
+def _layer(attribute: str, value: list[float]) -> dict[str, object]:
+    return {"part": NAME, "attribute": attribute, "kind": "all", "value": value}
 
 
 def _rim(chart: Chart, skin: Skin, mesh: FitMesh, eye: Floats, radius: float) -> Floats | None:

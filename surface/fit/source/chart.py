@@ -21,6 +21,9 @@ from surface.fit.source.mesh import FitMesh, directed_edges, face_areas, triangl
 TILE = 2.0  # distance in u between the tiles of two islands: too far for control points to reach the next tile
 FIRST_TILE = 0.5 * (1.0 + TILE)  # the u that the first tile and its control points stay below: tiles are 1 wide
 MAX_SLIT_ASPECT = 0.7  # height over width of a hole, below which it is a slit
+MIN_SLIT_LENGTH = (
+    1e-5  # of a slit in u, in tiles; what is shorter is a point, as corners of a hole that share one (u, v)
+)
 BORDER_WEIGHT = 8.0  # of samples on a border, where the surface has to meet its neighbour
 FOLD_STRETCH = (4.5, 7.0)  # stretch, in medians of it, where a fold of the mesh begins and where it is complete
 FOLD_WEIGHT = 0.05  # of samples deep in a fold
@@ -170,9 +173,9 @@ def _fold_weight(fold: Floats) -> Floats:
 
 
 def slit_of(loop: Floats) -> Cut | None:
-    """The centre line of a low, wide hole; None for a hole of any other form."""
+    """The centre line of a low, wide hole; None for a hole of any other form, and for one that is a point in (u, v)."""
     (u0, v0), (u1, v1) = loop.min(axis=0), loop.max(axis=0)
-    if v1 - v0 > MAX_SLIT_ASPECT * (u1 - u0):
+    if v1 - v0 > MAX_SLIT_ASPECT * (u1 - u0) or u1 - u0 < MIN_SLIT_LENGTH:
         return None
     return Cut(0.5 * (v0 + v1), u0, u1)
 

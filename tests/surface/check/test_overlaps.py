@@ -121,6 +121,17 @@ def test_flesh_ends_at_what_lines_the_mouth() -> None:
     assert measured(skin(), above, below) == {}
 
 
+@pytest.mark.parametrize(("back", "counts"), [(2.0, True), (-9.0, False)])
+def test_what_lines_the_lids_may_fold_inside_an_eyeball(back: float, counts: bool) -> None:
+    """A sheet before an eyeball, and one whose lower half ends in it; a blink pushes either on."""
+    points, triangles = plain.sheet((-8, 8), (-8, 8), 1.0)
+    ahead = np.where(points[:, 1] > -2.0, 2.0, back) + plain.RADIUS
+    at = points + plain.EYES[0] + ahead[:, None] * [0.0, 0.0, 1.0]
+    push = {"eyeBlinkLeft": np.tile([0.0, 0.0, -6.0], (len(points), 1))}
+    found = measured(plain.part("flesh", at, triangles, moves=push), plain.eyeball(0), plain.eyeball(1))
+    assert ("eye" in found) is counts
+
+
 def test_a_note_says_what_is_deeper_than_a_millimetre(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "Head", lambda data: data)
     monkeypatch.setattr(module, "find_mouth", lambda subject: None)

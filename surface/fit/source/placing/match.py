@@ -39,6 +39,7 @@ NOSES = 6  # places in one profile that are tried as the nose
 BINS = 60  # heights of a profile
 NEIGHBOUR_BINS = 4  # heights above and below a place that it must stand out of
 MAX_REFINED = 24  # fits that are refined
+STEPS = 40  # of a refinement: after 15 some slide on by millimetres along the face
 MAX_ALIGNMENT = 0.8  # mean of the normals of a sheet: above this it is too flat for a face; masks have up to 0.65
 MAX_DISTANCE = 25.0  # mm of the template: larger distances count as this
 GOOD_MM = 6.5  # the mean error of a face: sculptures and simple faces have up to 6, no other place less than 7
@@ -75,7 +76,7 @@ def match_face(vertices: Floats, faces: Ints) -> FaceMatch | None:
         template[:COARSE], facing[:COARSE], starts, 4
     )
     cloud = _Cloud(points, normals)
-    found = sorted(cloud.fits(template, facing, rough[:MAX_REFINED], 15), key=lambda m: m.error)
+    found = sorted(cloud.fits(template, facing, rough[:MAX_REFINED], STEPS), key=lambda m: m.error)
     if not found or found[0].error > GOOD_MM:
         return None
     others = [m for m in found[1:] if float((m.turn * found[0].turn).sum()) < SAME_TRACE]

@@ -130,7 +130,7 @@ def test_lids_follow_an_eye_that_looks_down_and_up(head: Head, look: str, way: i
 @pytest.mark.slow
 def test_no_part_of_an_eye_is_drawn_as_skin(head: Head) -> None:
     assert [(p.name, p.material) for p in head.parts] == [
-        ("face", "skin"), ("eye_left", "eye"), ("eye_right", "eye"),
+        ("face", "skin"), ("eye_left", "eye"), ("eye_right", "eye"), ("eye_corners", "skin"),
     ]  # fmt: skip
     assert [c.name for c in sorted(head.data.contacts, key=lambda c: c.name)] == ["left_lids", "right_lids"]
     np.testing.assert_allclose(head.data.eyes, eye_face.CENTRES, atol=0.5)

@@ -66,7 +66,7 @@ def test_skin_that_hardly_moves_stays_and_other_skin_moves_as_before(scale: floa
     rest, before = moved(given)
     _, after = moved(made)
     size, off = np.linalg.norm(before, axis=1), np.linalg.norm(after - before, axis=1)
-    assert off.max() < OFF_MM * scale and off[size > scale].max() < 3e-4 * scale
+    assert off.max() < OFF_MM * scale and off[size > scale].max() < 3e-3 * scale
     far = np.linalg.norm(rest[:, :2] - 50.0, axis=1) > 110.0
     assert (size[far] < STILL_MM * scale).all() and not after[far].any()
     (group,) = made.parts[0].groups

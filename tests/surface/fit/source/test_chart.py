@@ -224,6 +224,13 @@ def test_a_hole_lower_than_seven_tenths_of_its_width_is_a_slit(height: float, sl
         assert (found.v, found.start, found.end) == (pytest.approx(4.0), 1.0, 3.0)
 
 
+@pytest.mark.parametrize(("width", "slit"), [(0.0, False), (1e-7, False), (1e-3, True)])
+def test_a_hole_whose_corners_share_one_place_is_no_slit(width: float, slit: bool) -> None:
+    """As where a small face at a pole is missing: there is nothing to cut, and no length to divide by."""
+    rim = np.array([[2.0, 0.2], [2.0 + width, 0.2], [2.0 + 0.5 * width, 0.2]])
+    assert (slit_of(rim) is not None) is slit
+
+
 def test_the_hole_next_to_an_eye_is_its_own() -> None:
     mesh = slit_sheet()
     chart = make_chart(mesh, find_islands(mesh), normalise=False)

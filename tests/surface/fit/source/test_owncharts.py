@@ -121,6 +121,22 @@ def test_bent_holes_become_straight_along_u():
     assert np.ptp(middle) < 0.2 * half.min() and (signed_areas(straight) > 0).all()
 
 
+def test_a_hole_whose_corners_share_one_place_leaves_all_others_where_they_are():
+    """A face is missing whose corners are one point in (u, v): it has no width to straighten along."""
+    mesh = slit_sheet()
+    island = Island(np.arange(len(mesh.uv)), mesh.uv.copy(), mesh.faces)
+    inner = np.setdiff1d(np.arange(len(mesh.faces)), np.flatnonzero(np.isin(mesh.faces, boundary_rows(island)).any(1)))
+    gone = inner[0]
+    island.uv[island.faces[gone]] = island.uv[island.faces[gone, 0]]
+    holed = island.subset(np.arange(len(mesh.faces)) != gone)
+    assert len(boundary_loops(holed)) == len(boundary_loops(island)) + 1
+    np.testing.assert_allclose(straighten_holes(holed).uv, straighten_holes(island).uv, atol=1e-9)
+
+
+def boundary_rows(island: Island) -> np.ndarray:
+    return np.concatenate(boundary_loops(island))
+
+
 def squeezed(mesh: FitMesh, times: float) -> FitMesh:
     """The mesh with the upper tenth of its texture squeezed along v."""
     v = mesh.uv[:, 1]
