@@ -28,6 +28,8 @@ _PORES, _PORE_RADIUS, _PORE_SLOPE, _PORE_DARK, _GRAIN = 20, 1.3, 1.2, 0.8, 0.8
 _DETAIL_CENTRE = (0.0, 10.0, 5.0)
 _DETAIL_RADIUS, _DETAIL_BLEND = 95.0, 90.0
 _DETAIL_SIZE = 128
+#: Length of a tile of the detail texture on skin.
+DETAIL_TILE_MM = 2.0 * np.pi * _DETAIL_RADIUS / _DETAIL_TILES
 #: Brightness of the back of skin, as the hollow bust shows it from below and behind.
 _INSIDE = "0.25"
 #: A baked sky without occlusion.
@@ -169,16 +171,23 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
         | {
             "albedo_occlusion": np.rint(packed * 255.0).astype(np.uint8),
             "around": np.rint(attribute(part, "visible", _OPEN_SKY)[:, :4] * 255.0).astype(np.uint8),
-            "surface_uv_gloss": np.hstack([detail_uv(part), gloss, thin]).astype(np.float32),
+            "surface_uv_gloss": np.hstack([detail_uv(part, theme), gloss, thin]).astype(np.float32),
         }
     )
 
 
-def detail_uv(part: ViewPart) -> np.ndarray:
-    """Texture coordinates of the detail texture on a part at rest, (m, 2), in tiles.
+def detail_uv(part: ViewPart, theme: Theme) -> np.ndarray:
+    """Texture coordinates (m, 2) of the detail texture on a part, in tiles: as laid out for the head, where it was.
 
-    Longitude and latitude on the skull, height and reach on neck and shoulders: a head's own (u, v) are
-    stretched, and differ from part to part.
+    Plates and panels lie along longitude and latitude of the skull.
+    """
+    laid = part.attributes.get("grain")
+    return wrapped_uv(part) if laid is None or theme.seams or theme.lit else np.asarray(laid)
+
+
+def wrapped_uv(part: ViewPart) -> np.ndarray:
+    """Longitude and latitude of a part at rest on the skull, height and reach on neck and shoulders, (m, 2) in tiles: a
+    head's own (u, v) are stretched, and differ from part to part.
     """
     x, y, z = (np.asarray(part.vertices, np.float64) - _DETAIL_CENTRE).T
     reach = np.hypot(x, z)
