@@ -23,7 +23,7 @@ Arrays = dict[str, np.ndarray]
 _DETAIL_TILES = 18
 #: Pores: how many along a side of the detail texture, their radius in texels, how steep and how dark they are beside
 #: its noise, and how much of the noise's bumps is left beside them.
-_PORES, _PORE_RADIUS, _PORE_SLOPE, _PORE_DARK, _GRAIN = 20, 1.3, 1.2, 0.8, 0.8
+_PORES, _PORE_RADIUS, _PORE_SLOPE, _PORE_DARK, _GRAIN = 27, 1.1, 1.2, 0.8, 0.7
 #: Centre of the sphere that the detail is wrapped on, mm.
 _DETAIL_CENTRE = (0.0, 10.0, 5.0)
 _DETAIL_RADIUS, _DETAIL_BLEND = 95.0, 90.0

@@ -21,9 +21,9 @@ float noise(vec2 at, int level) {
     return texelFetch(detail, ivec2(at * float(side)) & (side - 1), level).w;
 }
 #else
-#define FRECKLED 1.30
+#define FRECKLED 1.20
 float noise(vec2 at, int level) {
-    return texture(detail, at).w;
+    return textureLod(detail, at, float(level)).w;  // finer lines of the noise would draw spots as strokes
 }
 #endif
 
