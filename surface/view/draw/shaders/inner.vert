@@ -10,7 +10,7 @@
 
 #define CORNER vec3(0.58, 0.46, 0.42)   // of the light, what lips and cheek leave to teeth at the corners of the mouth
 #define CORNER_AT vec2(0.45, 1.0)       // of the way there: where they begin to shade them, and where they do
-#define BEHIND vec3(0.66, 0.50, 0.50)    // of the light, what the tongue leaves to the inner sides of teeth far back
+#define BEHIND vec3(0.80, 0.66, 0.62)    // of the light, what the tongue leaves to the inner sides of teeth far back
 #define BEHIND_MM vec2(2.0, 22.0)       // behind the lips: where it begins to lie before them, and where it does
 
 uniform mat4 view_projection;
