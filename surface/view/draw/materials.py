@@ -23,7 +23,9 @@ Arrays = dict[str, np.ndarray]
 _DETAIL_TILES = 18
 #: Pores: how many along a side of the detail texture, their radius in texels, how steep and how dark they are beside
 #: its noise, and how much of the noise's bumps is left beside them.
-_PORES, _PORE_RADIUS, _PORE_SLOPE, _PORE_DARK, _GRAIN = 27, 1.1, 1.2, 0.8, 0.7
+_PORES, _PORE_RADIUS, _PORE_SLOPE, _PORE_DARK, _GRAIN = 26, 1.1, 1.2, 0.8, 0.7
+#: Where in its square a pore may lie: two that meet would look like one large pit.
+_PORE_ROOM = 0.2, 0.8
 #: Centre of the sphere that the detail is wrapped on, mm.
 _DETAIL_CENTRE = (0.0, 10.0, 5.0)
 _DETAIL_RADIUS, _DETAIL_BLEND = 95.0, 90.0
@@ -368,7 +370,7 @@ def _pores(random: np.random.Generator) -> np.ndarray:
     """Pits (size, size, 4) that tile: how the skin leans to the right and upwards in them, and how much darker they
     are; mipmaps level them where they are smaller than a pixel."""
     at, count = np.zeros((_DETAIL_SIZE, _DETAIL_SIZE)), _PORES**2
-    places = np.indices((_PORES, _PORES)).reshape(2, -1) + random.uniform(0.1, 0.9, (2, count))
+    places = np.indices((_PORES, _PORES)).reshape(2, -1) + random.uniform(*_PORE_ROOM, (2, count))
     at[tuple((places * _DETAIL_SIZE / _PORES).astype(int))] = random.uniform(0.3, 1.0, count)
     frequency = 2.0 * np.pi * np.fft.fftfreq(_DETAIL_SIZE)
     up, right = frequency[:, None], frequency[None, :]
