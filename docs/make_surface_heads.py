@@ -23,6 +23,7 @@ from surface.head import Head
 from surface.readers.thb import Hierarchy, Level, dyadic_refinement
 from surface.view import Camera, Offscreen
 from surface.view.draw.decimate import decimate_head
+from surface.view.draw.grain import grain_head
 from surface.view.pictures.occlusion import shade_head
 from surface.view.scene.framing import framed
 
@@ -289,6 +290,7 @@ def picture(folder: Path, pose: dict[str, float], camera: Camera) -> Image.Image
     """A head in a pose."""
     if not (folder / "decimated.npz").exists():
         decimate_head(folder)
+        grain_head(folder)
         shade_head(folder)
     head = Head.load(folder)
     with Offscreen(head, (SIZE, SIZE)) as screen:

@@ -348,11 +348,13 @@ def _decimate_and_shade(out: Path) -> bool:
     # imported lazily: not needed for --help
     from surface.base.errors import MissingPackage, ViewError
     from surface.view.draw.decimate import decimate_head
+    from surface.view.draw.grain import grain_head
     from surface.view.pictures.occlusion import shade_head
     from surface.view.pictures.outside import find_outside
 
     with console.status("decimating triangles for live pictures"):
         decimate_head(out)
+        grain_head(out)
     try:
         with console.status("baking the shading"):
             shade_head(out)

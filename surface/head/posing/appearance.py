@@ -42,6 +42,7 @@ UNEVEN = (
 )
 #: Patches of skin: directions and wave numbers (cycles in the distance of the eyes), whose waves add up.
 PATCHES = np.array(((1.9, 1.1, 0.6), (-1.3, 2.3, 0.9), (2.9, -0.7, 1.7), (0.8, 3.3, -1.9), (-3.7, 1.9, 1.2)))
+MATT = 0.34  # of its gloss, what skin at a melanin of 1 lacks: beside dark skin the same highlight looks like oil
 PATCHY_SHINE, PATCHY_TONE = 0.12, 0.05  # of the gloss, and in density at a melanin of 1
 
 
@@ -53,7 +54,7 @@ def apply_look(parts: Iterable[HeadPart], look: Look, eyes: Floats) -> None:
     for part in parts:
         if part.material == "skin":
             _colour_skin(part, look)
-            _spread_gloss(part, eyes)
+            _spread_gloss(part, eyes, MATT * (look.melanin or 0.0) ** 2)
             _mottle(part, look, eyes)
             if look.freckles > 0.0:
                 part.attributes["freckles"] = look.freckles * _freckle_density(part, eyes)
@@ -101,13 +102,14 @@ def _lip_coverage(part: HeadPart) -> Floats:
     return smoothstep(np.asarray(gloss[:, :1], np.float64), *LIPS_GLOSS)
 
 
-def _spread_gloss(part: HeadPart, eyes: Floats) -> None:
-    """Let skin shine by region, in patches; lips and lid rims keep what is painted on them."""
+def _spread_gloss(part: HeadPart, eyes: Floats, less: float) -> None:
+    """Let skin shine by region, in patches, ``less`` by a share; lips and lid rims keep what is painted on them."""
     if "albedo" not in part.attributes:
         return
     given = np.asarray(part.attributes.get("gloss", np.full((len(part.vertices), 1), PLAIN_GLOSS)), np.float64)
     places = _places(part, eyes)
     own = np.clip(PLAIN_GLOSS + _regions(places, SHINE), 0.08, None) * (1.0 + PATCHY_SHINE * _patches(places))
+    own *= 1.0 - less
     painted = np.clip((given - PLAIN_GLOSS) / (LIPS_GLOSS[1] - PLAIN_GLOSS), 0.0, 1.0)
     part.attributes["gloss"] = (own[:, None] + painted * (given - own[:, None])).astype(np.float32)
 

@@ -1,11 +1,12 @@
 """Read, write and apply what is baked for a head's meshes: shade, which is the share of the sky that each vertex sees
-(``occlusion.npz``), and decimated triangles (``decimated.npz``).
+(``occlusion.npz``), decimated triangles (``decimated.npz``), and where the grain of skin lies (``grain.npz``).
 
-Both files belong to one order of the vertices, which a checksum per part identifies; parts that are tessellated in
+These files belong to one order of the vertices, which a checksum per part identifies; parts that are tessellated in
 another way, and heads without the files, are drawn unshaded and with all their triangles.
 
 Shade under ``PART`` is (m, 1); there may be more: where the sky lies, ``PART/visible`` (m, 4), and how thin the flesh
 is, ``PART/thin`` (m, 1), 0 thick. Triangles are ``PART/full`` and, coarser, ``PART/fast``, both (k, 3).
+Grain under ``PART`` is (m, 2).
 """
 
 from __future__ import annotations
@@ -24,8 +25,9 @@ from surface.head.model.sidecar import Sidecar, read_sidecar, sidecar_path, writ
 from surface.head.posing.part import HeadPart
 from surface.mesh.mesh import Mesh
 
-SHADE, DECIMATED = "occlusion.npz", "decimated.npz"
+SHADE, DECIMATED, GRAIN = "occlusion.npz", "decimated.npz", "grain.npz"
 LEVELS = ("full", "fast")
+GRAIN_STEPS = 1 << 10  # per tile of the grain's texture
 STEPS = 1 << 14  # per unit of u and v
 OFFSET = 1 / 3  # of a step, so that dyadic fractions never lie on the border of two steps, where rounding would decide
 Shares = Mapping[str, NDArray[np.floating]]
@@ -162,3 +164,31 @@ def _is_valid(triangles: Triangles, vertices: int) -> bool:
     """Whether there are any triangles and all indices are in range."""
     shaped = triangles.ndim == 2 and triangles.shape[1] == 3 and len(triangles) > 0
     return bool(shaped and triangles.min() >= 0 and triangles.max() < vertices)
+
+
+def read_grain(head: str | Path, parts: Iterable[Meshed] = ()) -> dict[str, Floats32]:
+    """Return texture coordinates (m, 2) of the grain by part, in tiles; errors as :func:`read_shade`."""
+    return read_baked(head, GRAIN, parts, _tiles)
+
+
+def _tiles(stored: Array) -> Floats32:
+    """Return the coordinates. Raises ValueError: the array is damaged."""
+    if stored.ndim != 2 or stored.shape[1] != 2 or stored.dtype != np.int16:
+        raise ValueError(f"holds an array of shape {stored.shape} and type {stored.dtype}, expected (any, 2) int16")
+    return (stored / np.float32(GRAIN_STEPS)).astype(np.float32)
+
+
+def write_grain(head: str | Path, laid: Shares, parts: Iterable[HeadPart]) -> Path:
+    """Write texture coordinates (m, 2), in tiles, of ``parts`` to the head's folder; returns the file's path."""
+    limits = np.iinfo(np.int16)
+    packed = {n: np.clip(np.rint(uv * GRAIN_STEPS), limits.min, limits.max).astype(np.int16) for n, uv in laid.items()}
+    checks = {name: check for name, check in checksums(parts).items() if name in packed}
+    return write_sidecar(sidecar_path(head, GRAIN), packed, checks)
+
+
+def apply_grain(parts: Iterable[HeadPart], laid: Mapping[str, Floats32]) -> None:
+    """Set the ``grain`` attribute (m, 2) of the parts that it was laid out for."""
+    for part in parts:
+        found = laid.get(part.name)
+        if found is not None and len(found) == len(part.vertices):
+            part.attributes["grain"] = found

@@ -13,8 +13,10 @@ from surface.head.model.light import Refined
 from surface.head.posing.baked import (
     LEVELS,
     apply_decimated,
+    apply_grain,
     apply_shade,
     read_decimated,
+    read_grain,
     read_shade,
     tessellation_key,
 )  # fmt: skip
@@ -46,7 +48,7 @@ def apply_baked(path: str | Path, parts: Iterable[HeadPart], refined: Mapping[st
     parts = list(parts)
     known = [Original(p.name, refined[p.name].mesh) if p.name in refined else p for p in parts]
     shares, decimated = read_shade(path, known), read_decimated(path, known)
-    errors = read_fit_error(path, known)
+    errors, laid = read_fit_error(path, known), read_grain(path, known)
     for part in parts:
         finer = refined.get(part.name)
         if finer is None:
@@ -58,6 +60,9 @@ def apply_baked(path: str | Path, parts: Iterable[HeadPart], refined: Mapping[st
         decimated |= {f"{part.name}/{level}": t.astype(np.int32) for level, t in finer.coarser.items()}
         if part.name in errors:
             errors[part.name] = finer.carry(errors[part.name])
+        if part.name in laid:
+            laid[part.name] = finer.carry(laid[part.name])
     apply_shade(parts, shares)
     apply_decimated(parts, decimated)
+    apply_grain(parts, laid)
     apply_fit_error(parts, errors)

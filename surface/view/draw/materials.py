@@ -23,11 +23,15 @@ Arrays = dict[str, np.ndarray]
 _DETAIL_TILES = 18
 #: Pores: how many along a side of the detail texture, their radius in texels, how steep and how dark they are beside
 #: its noise, and how much of the noise's bumps is left beside them.
-_PORES, _PORE_RADIUS, _PORE_SLOPE, _PORE_DARK, _GRAIN = 20, 1.3, 1.2, 0.8, 0.8
+_PORES, _PORE_RADIUS, _PORE_SLOPE, _PORE_DARK, _GRAIN = 26, 1.1, 1.2, 0.8, 0.7
+#: Where in its square a pore may lie: two that meet would look like one large pit.
+_PORE_ROOM = 0.2, 0.8
 #: Centre of the sphere that the detail is wrapped on, mm.
 _DETAIL_CENTRE = (0.0, 10.0, 5.0)
 _DETAIL_RADIUS, _DETAIL_BLEND = 95.0, 90.0
 _DETAIL_SIZE = 128
+#: Length of a tile of the detail texture on skin.
+DETAIL_TILE_MM = 2.0 * np.pi * _DETAIL_RADIUS / _DETAIL_TILES
 #: Brightness of the back of skin, as the hollow bust shows it from below and behind.
 _INSIDE = "0.25"
 #: A baked sky without occlusion.
@@ -169,16 +173,23 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
         | {
             "albedo_occlusion": np.rint(packed * 255.0).astype(np.uint8),
             "around": np.rint(attribute(part, "visible", _OPEN_SKY)[:, :4] * 255.0).astype(np.uint8),
-            "surface_uv_gloss": np.hstack([detail_uv(part), gloss, thin]).astype(np.float32),
+            "surface_uv_gloss": np.hstack([detail_uv(part, theme), gloss, thin]).astype(np.float32),
         }
     )
 
 
-def detail_uv(part: ViewPart) -> np.ndarray:
-    """Texture coordinates of the detail texture on a part at rest, (m, 2), in tiles.
+def detail_uv(part: ViewPart, theme: Theme) -> np.ndarray:
+    """Texture coordinates (m, 2) of the detail texture on a part, in tiles: as laid out for the head, where it was.
 
-    Longitude and latitude on the skull, height and reach on neck and shoulders: a head's own (u, v) are
-    stretched, and differ from part to part.
+    Plates and panels lie along longitude and latitude of the skull.
+    """
+    laid = part.attributes.get("grain")
+    return wrapped_uv(part) if laid is None or theme.seams or theme.lit else np.asarray(laid)
+
+
+def wrapped_uv(part: ViewPart) -> np.ndarray:
+    """Longitude and latitude of a part at rest on the skull, height and reach on neck and shoulders, (m, 2) in tiles: a
+    head's own (u, v) are stretched, and differ from part to part.
     """
     x, y, z = (np.asarray(part.vertices, np.float64) - _DETAIL_CENTRE).T
     reach = np.hypot(x, z)
@@ -359,7 +370,7 @@ def _pores(random: np.random.Generator) -> np.ndarray:
     """Pits (size, size, 4) that tile: how the skin leans to the right and upwards in them, and how much darker they
     are; mipmaps level them where they are smaller than a pixel."""
     at, count = np.zeros((_DETAIL_SIZE, _DETAIL_SIZE)), _PORES**2
-    places = np.indices((_PORES, _PORES)).reshape(2, -1) + random.uniform(0.1, 0.9, (2, count))
+    places = np.indices((_PORES, _PORES)).reshape(2, -1) + random.uniform(*_PORE_ROOM, (2, count))
     at[tuple((places * _DETAIL_SIZE / _PORES).astype(int))] = random.uniform(0.3, 1.0, count)
     frequency = 2.0 * np.pi * np.fft.fftfreq(_DETAIL_SIZE)
     up, right = frequency[:, None], frequency[None, :]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from surface.mesh.mesh import border_edges
 
-_NECK_MM = 0.4, 1.8  # from the border of a crown: as far as it is all gum, and where the tooth begins
+_NECK_MM = 0.0, 0.8  # from the border of a crown: as far as it is all gum, and where the tooth begins
 _LOW = 0.80  # share of a crown's height, from its tip, above which a border is where crowns touch, not the gum
 _SAME_MM = 1e-3  # vertices that are closer are one
 _MAX_PAIRS = 1 << 16  # of a vertex and a vertex of the border, that are compared at a time

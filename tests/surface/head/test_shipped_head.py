@@ -52,3 +52,10 @@ def test_every_part_has_its_lean_triangles(head: Head) -> None:
     for part in head.parts:
         assert part.decimated.keys() == set(LEVELS), part.name
         assert len(part.triangles) > len(part.decimated["full"]) >= len(part.decimated["fast"]), part.name
+
+
+def test_the_grain_of_its_skin_is_laid_out_for_its_meshes(head: Head, folder: Path) -> None:
+    skins = {part.name for part in head.parts if part.material == "skin"}
+    checks = read_sidecar(folder / "grain.npz", lambda kept: kept.checks, "")
+    assert checks.keys() == skins and checks.items() <= checksums(head.parts).items()
+    assert all(head.part(name).attributes["grain"].shape == (len(head.part(name).vertices), 2) for name in skins)

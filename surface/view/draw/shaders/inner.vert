@@ -8,6 +8,8 @@
 #define CREVICE vec3(0.34, 0.19, 0.15)  // of the light, what is left between two teeth and at the gum
 #define OPEN_SHARE 0.55                 // of the sky that a tooth sees, from which on it is in the open
 
+#define CORNER vec3(0.68, 0.57, 0.53)   // of the light, what lips and cheek leave to teeth at the corners of the mouth
+#define CORNER_AT vec2(0.45, 1.0)       // of the way there: where they begin to shade them, and where they do
 #define BEHIND vec3(0.56, 0.50, 0.49)    // of the light, what the tongue leaves to the inner sides of teeth far back
 #define BEHIND_MM vec2(2.0, 22.0)       // behind the lips: where it begins to lie before them, and where it does
 
@@ -66,11 +68,15 @@ void main() {
     float reach = mix(clamp(direct, 0.0, 1.0), 1.0, smoothstep(-2.0, 4.0, past));
     // Light bounces between here and the red walls of the mouth: the less comes straight in, the more that counts.
     // Teeth pass it on to each other, whiter than those walls do.
-    vec3 bounce = mix(0.5 * (own + WALLS), NEIGHBOURS, 0.9 * teeth * (1.0 - inwards));
+    // Gums before the row have teeth beside them, too.
+    float before = step(0.2, albedo.g) * (1.0 - inwards) * (1.0 - deep);
+    vec3 bounce = mix(0.5 * (own + WALLS), NEIGHBOURS, 0.9 * max(teeth * (1.0 - inwards), 0.8 * before));
     vec3 arrives = reach / (reach + (1.0 - reach) * (1.0 - 0.9 * bounce));
-    arrives *= mix(vec3(1.0), mix(CREVICE, vec3(1.0), smoothstep(0.0, OPEN_SHARE, occlusion)), teeth);
+    arrives *= mix(vec3(1.0), mix(CREVICE, vec3(1.0), smoothstep(0.0, OPEN_SHARE, occlusion)), teeth * (1.0 - 0.7 * behind));
     arrives *= mix(vec3(1.0), BEHIND, behind);
+    float sideways = (1.0 - deep) * abs(dot(away, side)) / length(opening_side);
+    arrives *= mix(vec3(1.0), CORNER, teeth * (1.0 - inwards) * smoothstep(CORNER_AT.x, CORNER_AT.y, sideways));
     float nh = dot(n, normalize(key_direction + v));
-    float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach;
+    float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach * (1.0 - behind);  // else far teeth glitter
     v_colour = encode(own * tint * light * arrives + shine * key_colour);
 }

@@ -14,16 +14,16 @@ out vec4 colour;
 in float v_freckles;
 
 #ifdef GRAIN_TEXELS
-#define FRECKLED 1.34           // unfiltered noise is higher at its peaks
+#define FRECKLED 1.24           // unfiltered noise is higher at its peaks
 // One texel of a level at which the freckles' noise, smaller than the grain's, has texels as large as those of the grain.
 float noise(vec2 at, int level) {
     int side = 2 * int(GRAIN_TEXELS) >> level;
     return texelFetch(detail, ivec2(at * float(side)) & (side - 1), level).w;
 }
 #else
-#define FRECKLED 1.30
+#define FRECKLED 1.22
 float noise(vec2 at, int level) {
-    return texture(detail, at).w;
+    return textureLod(detail, at, float(level)).w;  // finer lines of the noise would draw spots as strokes
 }
 #endif
 
@@ -35,7 +35,7 @@ float freckle() {
 #endif
 
 #ifdef LIPS
-#define LIP_EDGE 0.20           // of v_lips to both sides of the edge
+#define LIP_EDGE 0.32           // of v_lips to both sides of the edge
 
 uniform vec3 lip_tint;
 in float v_lips;

@@ -3,6 +3,7 @@
 #define STEADY 0.2  // a strand keeps its height along its length, so that no piece of it is left by itself
 #define PARTING vec4(-0.3, 1.9, 3.6, 0.5)  // mm from the roots: scalp, hair; how unevenly strands begin; most of the scalp seen
 #define SCALP vec3(0.66, 0.56, 0.48)  // of skin between hair, which lights it warmly
+#define STAGGERED 1.37  // texels along the strands, by which each row of texels lies further than the one beside it
 uniform sampler2D detail;
 uniform vec3 scalp;  // how much brighter than hair the skin at a parting is
 uniform bool multisampled;  // alpha then decides how many samples of a pixel a strand covers
@@ -23,7 +24,10 @@ out vec4 colour;
 
 void main() {
 #ifdef GRAIN_TEXELS
-    vec4 noise = texelFetch(detail, ivec2(v_strand.xy * vec2(1.0, STEADY) * GRAIN_TEXELS) & (int(GRAIN_TEXELS) - 1), 1);
+    // One texel: filtering costs a software renderer more. Where they end side by side, their edges would show as steps.
+    vec2 at = v_strand.xy * vec2(2.0, 2.0 * STEADY) * GRAIN_TEXELS;
+    at.y += STAGGERED * floor(at.x);
+    vec4 noise = texelFetch(detail, ivec2(floor(at)) & (2 * int(GRAIN_TEXELS) - 1), 0);
     float height = 0.5 + 1.25 * (noise.w - 0.5) + 0.75 * (noise.x - 0.5);
 #else
     vec4 noise = texture(detail, v_strand.xy * vec2(1.0, STEADY));
@@ -35,10 +39,12 @@ void main() {
 #endif
     float over = v_strand.z - height;
     float cover = step(0.0, over);
+#ifndef GRAIN_TEXELS
     if (multisampled) {
         float soft = mix(SOFT.x, SOFT.y, clamp(1.6 * v_strand.z, 0.0, 1.0));
         cover = clamp(over / max(fwidth(over), soft) + 0.5, 0.0, 1.0);
     }
+#endif
     if (cover <= 0.0) {
         discard;
     }

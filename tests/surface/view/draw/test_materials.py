@@ -52,7 +52,7 @@ def test_missing_attributes_have_defaults() -> None:
 
 def test_detail_is_even_in_millimetres_and_closes_behind_the_head() -> None:
     part = skin()
-    uv = detail_uv(part)
+    uv = detail_uv(part, THEMES["skin"])
     front = np.argmin(np.linalg.norm(part.rest - [0, 10, 90], axis=1))
     near = np.flatnonzero(np.linalg.norm(part.rest - part.rest[front], axis=1) < 12)
     moved = np.linalg.norm(part.rest[near] - part.rest[front], axis=1)
@@ -95,7 +95,7 @@ def test_vertex_data_of_skin_comes_in_the_order_of_the_shader() -> None:
     made = material_of("skin").static(part, THEMES["skin"], Openings([part]))
     assert made["around"].dtype == np.uint8 and made["around"][0].tolist() == [0, 51, 102, 255]
     assert made["surface_uv_gloss"][:, 2:] == pytest.approx(np.tile([0.4, 0.7], (count, 1)))
-    assert made["surface_uv_gloss"][:, :2] == pytest.approx(detail_uv(part), abs=1e-5)
+    assert made["surface_uv_gloss"][:, :2] == pytest.approx(detail_uv(part, THEMES["skin"]), abs=1e-5)
     bare = material_of("skin").static(skin(), THEMES["skin"], Openings([part]))
     assert np.unique(bare["around"], axis=0).tolist() == [[191, 128, 128, 128]]
     assert bare["surface_uv_gloss"][:, 2:] == pytest.approx(np.tile([0.3, 0.0], (count, 1)))
@@ -112,7 +112,7 @@ def test_detail_is_longitude_and_latitude_on_the_skull_and_height_below_it() -> 
     part = skin()
     tiles = 18 / (2 * np.pi)
     part.vertices[:4] = [(0, 10, 100), (95, 10, 5), (0, 105, 5.001), (0, -200, 105)]
-    uv = detail_uv(part)[:4]
+    uv = detail_uv(part, THEMES["skin"])[:4]
     assert uv[:2] == pytest.approx(np.array([[0, 0], [0.5 * np.pi, 0]]) * tiles, abs=1e-5)
     assert uv[2, 1] == pytest.approx(0.5 * np.pi * tiles, abs=1e-3)
     assert uv[3, 1] == pytest.approx((-210 - 0.7 * (100 - 95)) / 95 * tiles, abs=1e-4)
