@@ -131,6 +131,7 @@ def fitted(monkeypatch):
     monkeypatch.setattr("surface.fit.points.report.face_bounds", lambda found: "face: 1.2 mm [max]")
     monkeypatch.setattr("controller.cli.heads._check_lines", lambda out: [])
     monkeypatch.setattr("surface.view.draw.decimate.decimate_head", lambda out: calls.append(("decimate", out)))
+    monkeypatch.setattr("surface.view.draw.grain.grain_head", lambda out: calls.append(("grain", out)))
     monkeypatch.setattr("surface.view.pictures.occlusion.shade_head", shade)
     monkeypatch.setattr(
         "surface.fit.identities.add_identities",
@@ -145,7 +146,7 @@ def test_fit_passes_its_options_on_and_tells_the_errors(fitted, tmp_path, monkey
     said = CliRunner().invoke(make_app(), ["fit", "a.glb", "-o", str(out)])
     assert said.exit_code == 0
     assert calls == [(Path("a.glb"), out, "mine", LoadOptions(None, None, None, None, None, ()), None),
-                     ("decimate", out), ("shade", out)]  # fmt: skip
+                     ("decimate", out), ("grain", out), ("shade", out)]  # fmt: skip
     words = " ".join(said.output.replace("│", " ").replace("┃", " ").split())
     assert "me: 123 control points, 2 shapes" in words
     assert "part control points RMS 99 % max mean RMS of shapes" in words

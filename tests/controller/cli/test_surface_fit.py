@@ -26,6 +26,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[tuple]:
 
     monkeypatch.setattr("surface.fit.surfaces.fit_surfaces", fit_surfaces)
     monkeypatch.setattr("surface.view.draw.decimate.decimate_head", lambda out: None)
+    monkeypatch.setattr("surface.view.draw.grain.grain_head", lambda out: None)
     monkeypatch.setattr("surface.view.pictures.occlusion.shade_head", lambda out: None)
     return made
 
