@@ -49,7 +49,7 @@ def flat(table, k, dtype):
 
 
 @inlined
-def rows(table, k, width, dtype):
+def wide(table, k, width, dtype):
     """Return array k of a table, whose rows have ``width`` numbers."""
     return carray(_pointer(table[2 * k]), (table[2 * k + 1], width), dtype)
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from surface.base.addresses import flat, make_table, rows
+from surface.base.addresses import flat, make_table, wide
 from surface.base.jit import merged
 
 NAMES = (
@@ -44,12 +44,12 @@ def arrays_of(table):
         flat(table, 0, np.int64), flat(table, 1, np.int64), flat(table, 2, np.int64), flat(table, 3, np.int64),
         flat(table, 4, np.int64), flat(table, 5, np.int64), flat(table, 6, np.int32), flat(table, 7, np.float32),
         flat(table, 8, np.float32), flat(table, 9, np.int64), flat(table, 10, np.int64),
-        flat(table, 11, np.int32), flat(table, 12, np.int32), rows(table, 13, 3, np.float64),
-        rows(table, 14, 3, np.float64), flat(table, 15, np.float32), flat(table, 16, np.float32),
+        flat(table, 11, np.int32), flat(table, 12, np.int32), wide(table, 13, 3, np.float64),
+        wide(table, 14, 3, np.float64), flat(table, 15, np.float32), flat(table, 16, np.float32),
         flat(table, 17, np.float32), flat(table, 18, np.int64), flat(table, 19, np.float32),
-        flat(table, 20, np.float32), rows(table, 21, 2, np.int64), flat(table, 22, np.int64),
+        flat(table, 20, np.float32), wide(table, 21, 2, np.int64), flat(table, 22, np.int64),
         flat(table, 23, np.int32), flat(table, 24, np.int32), flat(table, 25, np.int64),
-        rows(table, 26, 3, np.float64), rows(table, 27, 3, np.float32), flat(table, 28, np.float32),
+        wide(table, 26, 3, np.float64), wide(table, 27, 3, np.float32), flat(table, 28, np.float32),
         flat(table, 29, np.float64), flat(table, 30, np.float64), flat(table, 31, np.float64),
         flat(table, 32, np.float64),
         flat(table, 33, np.int64), flat(table, 34, np.int64), flat(table, 35, np.int32), flat(table, 36, np.int32),

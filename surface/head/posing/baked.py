@@ -182,13 +182,23 @@ def write_grain(head: str | Path, laid: Shares, parts: Iterable[HeadPart]) -> Pa
     """Write texture coordinates (m, 2), in tiles, of ``parts`` to the head's folder; returns the file's path."""
     limits = np.iinfo(np.int16)
     packed = {n: np.clip(np.rint(uv * GRAIN_STEPS), limits.min, limits.max).astype(np.int16) for n, uv in laid.items()}
-    checks = {name: check for name, check in checksums(parts).items() if name in packed}
-    return write_sidecar(sidecar_path(head, GRAIN), packed, checks)
+    return write_rows(sidecar_path(head, GRAIN), packed, parts)
 
 
 def apply_grain(parts: Iterable[HeadPart], laid: Mapping[str, Floats32]) -> None:
     """Set the ``grain`` attribute (m, 2) of the parts that it was laid out for."""
+    set_attribute(parts, "grain", laid)
+
+
+def set_attribute(parts: Iterable[HeadPart], attribute: str, rows: Mapping[str, Floats32]) -> None:
+    """Set an attribute of the parts for which there are rows (m, ...), one for each vertex, by part."""
     for part in parts:
-        found = laid.get(part.name)
+        found = rows.get(part.name)
         if found is not None and len(found) == len(part.vertices):
-            part.attributes["grain"] = found
+            part.attributes[attribute] = found
+
+
+def write_rows(path: Path, packed: Mapping[str, Array], parts: Iterable[HeadPart]) -> Path:
+    """Write arrays (m, ...) by part to a file beside a head, with checksums of the meshes that they belong to; returns
+    the path. Raises HeadFileError: it cannot be written."""
+    return write_sidecar(path, packed, {name: check for name, check in checksums(parts).items() if name in packed})

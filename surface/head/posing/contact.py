@@ -34,7 +34,7 @@ from surface.head.posing.contact_solve import NAMES, SIDES, clear_bound, gather_
 from surface.spline.kernels import fill_rows, row_capacity
 
 CONTACT_SHARE = 2 / 3  # fraction of the rows at an opening that can touch the other side; in the rest corrections fade
-INNER_SHARE = 0.7  # of these rows at lips
+INNER_SHARE = 0.7  # of the rows of lips that can touch: those from the rim on whose points the others take, too
 SOFT_MM = 0.1
 OVERLAP_MM = (0.28, 0.9)  # allowed overlap of lips and of lids: triangles cut about that off the edges of both sides
 NEARLY_MM = 1.2  # lips nearer than this at rest count as closed
@@ -271,8 +271,8 @@ def weights_at(surface: DCPSurface, uv: Floats) -> tuple[Ints, Ints, Floats]:
 def lip_weights(contact: Contact, surface: DCPSurface) -> SampleWeights:
     """Return how samples of lips that can touch depend on control points.
 
-    The outermost rows, :data:`INNER_SHARE` of them, take only points that the others take, so that shapes of brows and
-    cheeks leave all of these alone. At rest they lie where all points put them.
+    Rows beyond the inner ones, :data:`INNER_SHARE` of all, take only points that those take, so that shapes of brows
+    and cheeks leave all of them alone. At rest they lie where all points put them.
     """
     rows = contact_rows(contact)
     places = contact.places[:, :, :rows].reshape(-1, 2)

@@ -7,8 +7,7 @@ from math import factorial
 
 import numpy as np
 
-from surface.base.addresses import flat
-from surface.base.addresses import rows as wide
+from surface.base.addresses import flat, wide
 from surface.base.arrays import Floats, Floats32, Ints, Shorts
 from surface.base.jit import inlined, kernel, nonallocating
 from surface.spline.lanes import (

@@ -23,8 +23,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from surface.base.addresses import flat, shaped
-from surface.base.addresses import rows as wide
+from surface.base.addresses import flat, shaped, wide
 from surface.base.jit import kernel, merged, nonallocating
 
 from .contact_kernels import (

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from surface.base.arrays import Floats, Floats32
-from surface.head.model.sidecar import sidecar_path, write_sidecar
-from surface.head.posing.baked import Meshed, checksums, read_baked
+from surface.head.model.sidecar import sidecar_path
+from surface.head.posing.baked import Meshed, read_baked, set_attribute, write_rows
 from surface.head.posing.part import HeadPart
 
 FIT_ERROR = "fit_error.npz"
@@ -49,13 +49,9 @@ def write_fit_error(head: str | Path, errors: Mapping[str, Floats], parts: Itera
     for name, mm in errors.items():
         steps = np.minimum(np.rint(np.nan_to_num(mm) / STEP_MM), UNKNOWN - 1)
         packed[name] = np.where(np.isnan(mm), UNKNOWN, steps).astype(np.uint16)
-    checks = {name: check for name, check in checksums(parts).items() if name in packed}
-    return write_sidecar(sidecar_path(head, FIT_ERROR), packed, checks)
+    return write_rows(sidecar_path(head, FIT_ERROR), packed, parts)
 
 
 def apply_fit_error(parts: Iterable[HeadPart], errors: Mapping[str, Floats32]) -> None:
     """Set the ``fit_error`` attribute (m,) mm of the parts that were measured."""
-    for part in parts:
-        found = errors.get(part.name)
-        if found is not None and len(found) == len(part.vertices):
-            part.attributes[ATTRIBUTE] = found
+    set_attribute(parts, ATTRIBUTE, errors)

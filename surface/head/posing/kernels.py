@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 
-from surface.base.addresses import flat, shaped
-from surface.base.addresses import rows as wide
+from surface.base.addresses import flat, shaped, wide
 from surface.base.arrays import Floats, Floats32, Ints
 from surface.base.jit import inlined, kernel, nonallocating
 from surface.spline.lanes import (
