@@ -17,6 +17,7 @@ from small_head import small_head
 from surface.base.errors import HeadFileError
 from surface.head import Head, HeadData, save_data
 from surface.head.model.meshes import make_surface, pack, tessellate
+from surface.head.posing import baked
 from surface.head.posing.baked import (
     DECIMATED,
     SHADE,
@@ -251,3 +252,10 @@ def test_indices_are_stored_as_narrowly_as_they_can_be(tmp_path: Path, highest: 
     with np.load(path) as stored:
         assert stored["a/full"].dtype == kind
     assert read_decimated(tmp_path)["a/full"].tolist() == triangles.tolist()
+
+
+def test_rows_of_another_mesh_are_no_attribute_of_a_part() -> None:
+    one, other = (SimpleNamespace(name=name, vertices=np.zeros((3, 3)), attributes={}) for name in ("a", "b"))
+    rows = {"a": np.ones((3, 2), np.float32), "b": np.ones((4, 2), np.float32)}
+    baked.set_attribute([one, other], "grain", rows)  # type: ignore[list-item]
+    assert one.attributes["grain"] is rows["a"] and not other.attributes
