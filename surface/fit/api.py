@@ -34,6 +34,8 @@ from surface.fit.measures.dense import errors_at_rest
 from surface.fit.measures.mend import faults_of, mend_spikes, turned_faces
 from surface.fit.measures.own_overlaps import MeshOverlaps
 from surface.fit.measures.refusal import save_or_refuse
+from surface.fit.painting.skin import SkinIslands
+from surface.fit.painting.texture import head_texture
 from surface.fit.points.facets import facet_sag
 from surface.fit.points.importance import POINTS_PER_EYE as MORE_POINTS
 from surface.fit.points.importance import with_importance
@@ -64,6 +66,7 @@ from surface.head.model.data import HeadData, Neck, PartData, with_greatest_erro
 from surface.head.model.file import check_writable, load_data
 from surface.head.model.meshes import pack, tessellate
 from surface.head.model.parameters import NAMES, read_pose
+from surface.head.model.texture import HeadTexture
 from surface.head.posing.fit_error import write_fit_error
 from surface.head.posing.part import make_surface
 from surface.head.posing.rig import SkinRig
@@ -108,7 +111,8 @@ def fit_head(
     result = fit_mesh(loaded, name, report, str(mesh_path))
     if report_dir is not None:
         write_report(result, report_dir, report)
-    save_or_refuse(out_dir, result.head, result.report.faults, result.errors, result.accessories, force=force)
+    beside = result.errors, result.accessories, result.texture
+    save_or_refuse(out_dir, result.head, result.report.faults, *beside, force=force)
     return result.report
 
 
@@ -170,6 +174,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         head, lid_notes = seat_drawn_lids(head)
         head, squint_notes = cancel_squints_in_blinks(head)
         plan.notes.extend([*lid_notes, *squint_notes])
+    texture = _texture(mesh, plan)
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
     head = localised(head, scale)
@@ -183,7 +188,17 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets,
         {**loaded.pieces, **worn.pieces}, dense, tuple(faults_of(dense, fitted_parts, scale)), loaded.named.filled,
     )  # fmt: skip
-    return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts), worn.accessories)
+    return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts), worn.accessories, texture)
+
+
+def _texture(mesh: FitMesh, plan: Plan) -> HeadTexture | None:
+    """The texture of the head of a mesh whose eyes were looked for, so that it is known what is skin."""
+    if not plan.found:
+        return None
+    skin = [SkinIslands(part.name, own, part.tiled) for part, own in plan.parts if part.material == "skin"]
+    texture, notes = head_texture(mesh, plan.found, skin)
+    plan.notes.extend(notes)
+    return texture
 
 
 def _kinds(loaded: Loaded) -> set[str]:

@@ -90,6 +90,12 @@ def linear(srgb: Floats) -> Floats:
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
+def srgb(intensity: Floats) -> Floats:
+    """Return sRGB intensities of linear ones, 0..1 (IEC 61966-2-1)."""
+    bright = 1.055 * np.maximum(intensity, 0.0031308) ** (1.0 / 2.4) - 0.055
+    return np.where(intensity <= 0.0031308, 12.92 * intensity, bright)
+
+
 def kind_of_picture(data: bytes) -> str:
     """Return the MIME type of a picture by its first bytes; "" for one that is not PNG, JPEG or WebP."""
     return next((kind for start, kind in PICTURES.items() if data.startswith(start)), "")

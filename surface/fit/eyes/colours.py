@@ -88,12 +88,12 @@ def eye_colours(mesh: FitMesh, eyes: Eyes) -> list[EyeColours]:
     apart = float(np.linalg.norm(eyes.centres[0] - eyes.centres[1]))
     usual = eyes.iris / eyes.radius if eyes.iris > 0 else USUAL_IRIS * apart / eyes.radius
     usual = float(np.clip(usual, MIN_IRIS, MAX_IRIS))
-    sides = zip(_sides(mesh, eyes), eyes.centres, strict=True)
+    sides = zip(faces_by_side(mesh, eyes), eyes.centres, strict=True)
     return [_one(mesh, ids, centre, usual) for ids, centre in sides]
 
 
-def _sides(mesh: FitMesh, eyes: Eyes) -> list[Ints]:
-    """Faces of the left and of the right eye."""
+def faces_by_side(mesh: FitMesh, eyes: Eyes) -> list[Ints]:
+    """Faces of the left and of the right eye, as far as they are drawn."""
     ids = np.flatnonzero(eyes.drawn)
     middle = mesh.vertices[mesh.faces[ids, :3]].mean(axis=1)
     off = np.linalg.norm(middle[:, None] - eyes.centres, axis=2)

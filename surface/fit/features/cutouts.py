@@ -12,13 +12,11 @@ import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
 from surface.fit.features.contours import contours
-from surface.fit.source.islands import Island
+from surface.fit.source.islands import FaceNumbers, Island, face_numbers, faces_of, texture_corners
 from surface.fit.source.mesh import FitMesh, triangles
 from surface.fit.source.textures import opacity_at
 from surface.head.model.data import PartData
 from surface.readers.meshdata import Material
-
-FaceNumbers = dict[tuple[int, ...], int]  # index of each face of a mesh, by its sorted corners
 
 MATERIALS = "brow", "lash"
 SIDE = 200  # places along the longer side of an island at which its opacity is looked up
@@ -34,7 +32,7 @@ def cut_out(part: PartData, mesh: FitMesh, islands: list[Island]) -> PartData:
     """
     if part.material not in MATERIALS:
         return part
-    face_of = {tuple(sorted(face)): k for k, face in enumerate(mesh.faces.tolist())}
+    face_of = face_numbers(mesh)
     found = [_outlines(mesh, island, face_of) for island in islands]
     if all(f is None for f in found) or len(part.loops) != len(islands):  # a card with holes keeps them
         return part
@@ -44,7 +42,7 @@ def cut_out(part: PartData, mesh: FitMesh, islands: list[Island]) -> PartData:
 
 def _outlines(mesh: FitMesh, island: Island, face_of: FaceNumbers) -> list[Floats] | None:
     """Closed lines (k, 2) around what is opaque of an island; None where that is all of it, hardly any, or unknown."""
-    faces = _faces_of(island, face_of)
+    faces = faces_of(island, face_of)
     material = mesh.material_of(int(faces[0])) if len(faces) and (faces >= 0).all() else None
     if material is None or material.texture is None or material.alpha == "OPAQUE":
         return None
@@ -65,7 +63,7 @@ def _raster(
     """Opacity (w, h) at places ``step`` apart from ``low`` on in (u, v), and which of them the island covers."""
     texture_at = np.full((*size, 2), np.nan)
     corner = island.uv[triangles(island.faces)]
-    texture = mesh.uv[_texture_corners(mesh, island, faces)]
+    texture = mesh.uv[texture_corners(mesh, island, faces)]
     for tri, own in zip(corner, texture, strict=True):
         first = np.maximum(np.floor((tri.min(axis=0) - low) / step).astype(int), 0)
         last = np.minimum(np.ceil((tri.max(axis=0) - low) / step).astype(int) + 1, size)
@@ -86,22 +84,6 @@ def _shares(tri: Floats, at: Floats) -> Floats:
         return np.full((len(at), 3), -1.0)
     rest = np.linalg.solve(sides, (at - tri[0]).T).T
     return np.column_stack([1.0 - rest.sum(axis=1), rest])
-
-
-def _faces_of(island: Island, face_of: FaceNumbers) -> Ints:
-    """(f,) the mesh's face of each face of an island, -1 where it has none."""
-    own = np.where(island.faces >= 0, island.vertex[island.faces], -1)
-    return np.array([face_of.get(tuple(sorted(face)), -1) for face in own.tolist()], np.int64)
-
-
-def _texture_corners(mesh: FitMesh, island: Island, faces: Ints) -> Ints:
-    """(t, 3) rows of ``mesh.uv`` at the corners of an island's triangles, whose own (u, v) may be others."""
-    own = np.where(island.faces >= 0, island.vertex[island.faces], -1)
-    out = np.full(island.faces.shape, -1, np.int64)
-    for k in range(4):
-        same = mesh.faces[faces] == own[:, k, None]
-        out[:, k] = np.where(own[:, k] >= 0, mesh.face_uv[faces, same.argmax(axis=1)], -1)
-    return triangles(out)
 
 
 def _area(line: Floats) -> float:

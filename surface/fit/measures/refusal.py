@@ -10,6 +10,7 @@ from surface.base.errors import FitError
 from surface.fit.measures.saving import save_head
 from surface.head.model.accessories import Accessory
 from surface.head.model.data import HeadData
+from surface.head.model.texture import HeadTexture
 
 REFUSED = "-refused"  # what is put behind the name of a folder
 HINT = "correct the mesh there or leave out what hides it (--without NAME)"
@@ -23,11 +24,12 @@ def refused_folder(out_dir: str | Path) -> Path:
 
 def save_or_refuse(
     out_dir: str | Path, head: HeadData, faults: Sequence[str], errors: Mapping[str, Floats],
-    accessories: Sequence[Accessory] = (), *, force: bool = False, hint: str = HINT,
+    accessories: Sequence[Accessory] = (), texture: HeadTexture | None = None, *, force: bool = False, hint: str = HINT,
 ) -> None:  # fmt: skip
     """Write a head to ``out_dir``; one with faults to the folder :func:`refused_folder` instead, unless forced.
 
-    errors, accessories : as for :func:`surface.fit.measures.saving.save_head`, which says in which order files change.
+    errors, accessories, texture : as for :func:`surface.fit.measures.saving.save_head`, which says in which order files
+        change.
     hint : what to do about faults, in words.
 
     Raises FitError: the head has faults; what is in ``out_dir`` stays as it was. HeadFileError: a folder cannot be
@@ -35,7 +37,7 @@ def save_or_refuse(
     """
     refused = bool(faults) and not force
     folder = refused_folder(out_dir) if refused else Path(out_dir)
-    save_head(folder, head, errors, accessories)
+    save_head(folder, head, errors, accessories, texture)
     if refused:
         what = f"the head is refused: {'; '.join(faults)}; it was written to {folder} instead"
         look = f"look at it (omote render --head {folder} -o out.png), {hint}"

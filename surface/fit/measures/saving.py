@@ -12,20 +12,22 @@ from surface.head import Head
 from surface.head.model.accessories import FILE, Accessory, write_accessories
 from surface.head.model.data import HeadData
 from surface.head.model.file import save_data
+from surface.head.model.texture import FILE as TEXTURE
+from surface.head.model.texture import HeadTexture, write_texture
 from surface.head.posing.fit_error import FIT_ERROR, write_fit_error
 
-OWN = (FIT_ERROR, FILE)  # files that belong to one head alone, and do not say to which
+OWN = (FIT_ERROR, FILE, TEXTURE)  # files that belong to one head alone, and do not say to which
 ASIDE = ".old"  # what is put behind their names while another head is written
 
 
 def save_head(
     folder: str | Path, head: HeadData, errors: Mapping[str, Floats] | None = None,
-    accessories: Sequence[Accessory] = (),
+    accessories: Sequence[Accessory] = (), texture: HeadTexture | None = None,
 ) -> None:  # fmt: skip
     """Write a head to a folder, in the place of the one that may be there.
 
     errors : by part, (m,) mm from each vertex at rest to the mesh, NaN where there is none; kept beside the head, as
-    ``accessories`` are. None: the head was fitted to no mesh.
+    ``accessories`` and the ``texture`` of its skin are. None: the head was fitted to no mesh.
 
     First the files :data:`OWN` of the head before are put aside, then head.toml and head.npz replace the old ones, then
     what was put aside is removed, and last the new head's own files are written. So the old head gets everything back
@@ -39,6 +41,7 @@ def save_head(
     if errors is not None:
         write_fit_error(folder, errors, Head(head).parts)
     write_accessories(folder, accessories)
+    write_texture(folder, texture)
 
 
 @contextmanager

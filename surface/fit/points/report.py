@@ -13,6 +13,7 @@ from surface.fit.points.refine import Fitted
 from surface.fit.source.chart import Chart
 from surface.head.model.accessories import Accessory
 from surface.head.model.data import HeadData
+from surface.head.model.texture import HeadTexture
 
 MOST_NAMES = 4  # of one kind that a line names
 NEUTRAL = "neutral"
@@ -225,7 +226,7 @@ class FitResult:
     """A fitted head: its data, the report, and the charts it was fitted in.
 
     errors : by part, (m,) mm from each vertex at rest to the mesh; NaN where it has none.
-    accessories : meshes that it wears as they are.
+    accessories : meshes that it wears as they are. texture : of its skin; None without one.
     """
 
     head: HeadData
@@ -233,6 +234,7 @@ class FitResult:
     parts: list[FittedPart]
     errors: dict[str, Floats] = field(default_factory=dict)
     accessories: tuple[Accessory, ...] = ()
+    texture: HeadTexture | None = None
 
 
 def face_bounds(report: FitReport) -> str:

@@ -104,7 +104,7 @@ def make_chart(
     downweight_slivers : slopes count less at long thin faces (:func:`face_slopes`), and at faces that are large for the
         curvature of what they show (:func:`surface.fit.source.bends.slope_trust`).
     """
-    placed = [_place(island, k) if normalise else island for k, island in enumerate(islands)]
+    placed = [in_tile(island, k) if normalise else island for k, island in enumerate(islands)]
     pieces = [_piece(mesh, island, downweight_slivers=downweight_slivers) for island in placed]
     rows: dict[str, Any] = {
         k: np.concatenate([getattr(p, k) for p in pieces]) for k in ("uv", "weight", "spacing", "folded")
@@ -180,9 +180,10 @@ def slit_of(loop: Floats) -> Cut | None:
     return Cut(0.5 * (v0 + v1), u0, u1)
 
 
-def _place(island: Island, k: int) -> Island:
+def in_tile(island: Island, k: int) -> Island:
+    """An island in the k-th tile of (u, v), mirrored where its normals would point inwards."""
     a, b, c = (island.uv[island.faces[:, k]] for k in range(3))
-    clockwise = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum() < 0  # normals would point inwards
+    clockwise = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]).sum() < 0
     uv = island.uv * ([-1.0, 1.0] if clockwise else [1.0, 1.0])
     low, high = uv.min(axis=0), uv.max(axis=0)
     uv = (uv - low) / max(float((high - low).max()), 1e-12) + [TILE * k, 0.0]

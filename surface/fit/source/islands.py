@@ -12,8 +12,9 @@ from itertools import pairwise
 import numpy as np
 
 from surface.base.arrays import Bools, Floats, Ints
-from surface.fit.source.mesh import FitMesh, components, corners, directed_edges, renumbered
+from surface.fit.source.mesh import FitMesh, components, corners, directed_edges, renumbered, triangles
 
+FaceNumbers = dict[tuple[int, ...], int]  # index of each face of a mesh, by its sorted corners
 WELD = 1e5  # texture coordinates that agree to this many parts of the unit square are one
 
 
@@ -53,6 +54,27 @@ def _weld(mesh: FitMesh, chosen: Ints) -> Island:
     corner = np.full(f.shape, -1, np.int64)
     corner[used] = inverse.ravel()
     return Island(f[used][first], mesh.uv[fu[used][first]], corner)
+
+
+def face_numbers(mesh: FitMesh) -> FaceNumbers:
+    """The index of each face of a mesh by its corners, for :func:`faces_of`."""
+    return {tuple(sorted(face)): k for k, face in enumerate(mesh.faces.tolist())}
+
+
+def faces_of(island: Island, face_of: FaceNumbers) -> Ints:
+    """(f,) the mesh's face of each face of an island, -1 where it has none."""
+    own = np.where(island.faces >= 0, island.vertex[island.faces], -1)
+    return np.array([face_of.get(tuple(sorted(face)), -1) for face in own.tolist()], np.int64)
+
+
+def texture_corners(mesh: FitMesh, island: Island, faces: Ints) -> Ints:
+    """(t, 3) rows of ``mesh.uv`` at the corners of an island's triangles, whose own (u, v) may be others."""
+    own = np.where(island.faces >= 0, island.vertex[island.faces], -1)
+    out = np.full(island.faces.shape, -1, np.int64)
+    for k in range(4):
+        same = mesh.faces[faces] == own[:, k, None]
+        out[:, k] = np.where(own[:, k] >= 0, mesh.face_uv[faces, same.argmax(axis=1)], -1)
+    return triangles(out, own)
 
 
 def signed_areas(island: Island) -> Floats:

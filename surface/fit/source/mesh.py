@@ -129,6 +129,12 @@ def triangles(faces: Ints, like: Ints | None = None) -> Ints:
     return np.concatenate([faces[:, :3], quads[:, [0, 2, 3]]])
 
 
+def face_of_triangles(faces: Ints) -> Ints:
+    """(t,) the row in ``faces`` (f, 4) of each of their :func:`triangles`."""
+    rows = np.arange(len(faces))
+    return np.concatenate([rows, rows[faces[:, 3] >= 0]])
+
+
 def corners(faces: Ints) -> tuple[Ints, Ints, Ints, Ints]:
     """The four corners (f,) of all faces; a triangle's last is its third."""
     last = np.where(faces[:, 3] < 0, faces[:, 2], faces[:, 3])

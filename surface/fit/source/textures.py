@@ -45,7 +45,7 @@ def sample_colours(
 
 def opacity_at(material: Material, uv: Floats) -> Floats:
     """(m,) opacity of a material, 0..1, at texture coordinates (m, 2); its own where its texture cannot be read."""
-    picture = _picture(material.texture) if material.texture is not None else None
+    picture = linear_picture(material.texture) if material.texture is not None else None
     own = np.full(len(uv), material.colour[3])
     return own if picture is None else own * _looked_up(picture, material.in_picture(uv))[:, 3]
 
@@ -72,7 +72,7 @@ def _of_piece(
     if material is None and tint is None:
         return None
     material = material or Material()
-    picture = _picture(material.texture) if material.texture is not None else None
+    picture = linear_picture(material.texture) if material.texture is not None else None
     mapped = bool((mesh.face_uv[faces][:, :3] >= 0).all()) and len(mesh.uv) > 0
     plain = tint is None and material.colour[:3] == (1.0, 1.0, 1.0)
     if picture is None and (material.texture is not None or plain):
@@ -107,14 +107,14 @@ def _inside(steps: int) -> Floats:
 
 def average_colour(data: bytes) -> Floats | None:
     """(3,) mean linear RGB of what is not clear of an encoded picture; None where it or Pillow cannot be read."""
-    picture = _picture(data)
+    picture = linear_picture(data)
     if picture is None or not picture[..., 3].any():
         return None
     mean: Floats = np.average(picture[..., :3].reshape(-1, 3), axis=0, weights=picture[..., 3].ravel())
     return mean
 
 
-def _picture(data: bytes) -> Floats | None:
+def linear_picture(data: bytes) -> Floats | None:
     """(h, w, 4) linear RGB and opacity of an encoded picture; None where it or Pillow cannot be read."""
     try:
         from PIL import Image  # optional: the extra view
@@ -130,6 +130,19 @@ def _picture(data: bytes) -> Floats | None:
         return None
     pixels[..., :3] = linear(pixels[..., :3])
     return pixels
+
+
+def filtered(picture: Floats, at: Floats) -> Floats:
+    """(m, 4) a picture (h, w, 4) at places (m, 2), 0..1 right and down, linear between its pixels; pictures repeat."""
+    size = np.array(picture.shape[1::-1])
+    place = at * size - 0.5
+    low = np.floor(place).astype(np.int64)
+    x, y = (place - low).T[..., None]
+    (left, top), (right, bottom) = (low % size).T, ((low + 1) % size).T
+    above = (1.0 - x) * picture[top, left] + x * picture[top, right]
+    below = (1.0 - x) * picture[bottom, left] + x * picture[bottom, right]
+    mixed: Floats = (1.0 - y) * above + y * below
+    return mixed
 
 
 def _looked_up(picture: Floats, at: Floats) -> Floats:

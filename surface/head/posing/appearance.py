@@ -9,6 +9,7 @@ import numpy as np
 from surface.base.arrays import Floats, Floats32
 from surface.head.model.look import OWN_MELANIN, Colour, Look, skin_albedo, skin_tone
 from surface.head.model.parameters import smoothstep
+from surface.head.model.texture import HeadTexture
 from surface.head.posing.part import HeadPart
 
 Region = tuple[tuple[float, float], tuple[float, float], float]
@@ -60,10 +61,23 @@ def apply_look(parts: Iterable[HeadPart], look: Look, eyes: Floats) -> None:
                 part.attributes["freckles"] = look.freckles * _freckle_density(part, eyes)
         elif part.material == "eye" and look.iris is not None:
             part.attributes["iris"] = _fill_colour(part, look.iris)
+            part.attributes.pop("texture_rectangle", None)
         elif part.material == "brow":
             if look.brow is not None:
                 part.attributes["albedo"] = _fill_colour(part, look.brow)
             part.attributes["strength"] = np.full((len(part.vertices), 1), look.brow_strength, np.float32)
+
+
+def apply_texture(parts: Iterable[HeadPart], texture: HeadTexture) -> None:
+    """Set the places in the texture, ``texture_uv`` (m, 2), of all parts: those that it does not draw lie where it
+    leaves the skin as it is. An eye has the rectangle of its front instead, ``texture_rectangle`` (m, 4), alike for all
+    of it."""
+    for part in parts:
+        if part.material == "eye":
+            if part.name in texture.tiles:
+                part.attributes["texture_rectangle"] = np.tile(texture.tiles[part.name][0], (len(part.vertices), 1))
+            continue
+        part.attributes["texture_uv"] = texture.places(part.name, part.uv)
 
 
 def _fill_colour(part: HeadPart, colour: Colour) -> Floats32:

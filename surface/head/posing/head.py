@@ -22,8 +22,9 @@ from surface.head.model.parameters import NAMES, SHAPES, Pose, read_pose, rotati
 from surface.head.model.rules import Drivers
 from surface.head.model.sidecar import DAMAGED, reason
 from surface.head.model.sway import Sway
+from surface.head.model.texture import HeadTexture, read_texture
 from surface.head.model.wardrobe import read_garment, with_garments
-from surface.head.posing.appearance import apply_look
+from surface.head.posing.appearance import apply_look, apply_texture
 from surface.head.posing.dressing import WornMesh, dress
 from surface.head.posing.finer import apply_baked, coarser_of
 from surface.head.posing.paint import paint_part
@@ -42,6 +43,7 @@ class Head:
     sway : of its hair; a program that draws a moving picture gives it the time.
     own_groups : what :meth:`add_groups` added.
     accessories : meshes that it wears as they are, such as glasses; no parts, because no control points move them.
+    texture : of its skin and eyes, as its mesh brought it; None without one.
     """
 
     parameters: tuple[str, ...] = NAMES
@@ -59,6 +61,7 @@ class Head:
         self._at = {name: i for i, name in enumerate(self.parameters)}
         self._last_turn = b"", Turn(np.eye(3), data.neck.pivot)
         self.accessories: tuple[WornMesh, ...] = ()
+        self.texture: HeadTexture | None = None
 
     @property
     def contacts(self) -> Sequence[Contact]:
@@ -87,11 +90,14 @@ class Head:
         refined: Mapping[str, Refined] = {}
         if light:
             data, refined = with_light(data, light, partial(coarser_of, path))
-        accessories = read_accessories(path)
+        accessories, texture = read_accessories(path), read_texture(path)
         try:
             head = cls(data, str(path))
             head.accessories = tuple(WornMesh(one, data.neck) for one in accessories)
             apply_baked(path, head.parts, refined)
+            if texture is not None:
+                head.texture = texture
+                apply_texture(head.parts, texture)
             if look is not None:
                 apply_look(head.parts, look, data.eyes)
                 dress(head.parts, garments)

@@ -37,6 +37,8 @@ _INSIDE = "0.25"
 #: A baked sky without occlusion.
 _OPEN_SKY = (0.75, 0.5, 0.5, 0.5)
 _LOWER_LASHES = 0.42
+#: Rectangle of an eye without a texture.
+_NOWHERE = (0.0, 0.0, 0.0, 0.0)
 #: Half the width of a tongue's furrow, mm, and how much of the light it takes.
 _GROOVE_MM, _GROOVE = 2.2, 0.5
 #: Radius of an iris, in eyeball radii, and of its pupil, in radii of the iris.
@@ -54,6 +56,8 @@ BEHIND_LIPS = ("teeth", "gums")
 WORN = ("strand", "cloth")
 #: Attributes of skin that are drawn by pixel, with quality "full": freckles, and the edge of the lips.
 FINE = ("freckles", "lips")
+#: What a head's skin has whose mesh brought a texture, drawn by pixel in every quality.
+TEXTURE = "texture"
 
 
 @dataclass(frozen=True)
@@ -84,9 +88,12 @@ def programs(
     """Every program of a quality and a theme, by name; ``fine`` as in :func:`skin_program`, ``worn`` : which of those
     for what is worn."""
     flat = ("flat.frag",)
+    eye: dict[str, int | str] = {"LID_POINTS": LID_POINTS}
+    if TEXTURE in fine and theme.use_painted:
+        eye["TEXTURE"] = 1
     return {name: worn_program(ctx, name, quality) for name in WORN if name in worn} | {
         "skin": skin_program(ctx, quality, theme, fine=fine),
-        "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines={"LID_POINTS": LID_POINTS}),
+        "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines=eye),
         "inner": build(
             ctx,
             *(
@@ -104,13 +111,18 @@ def skin_program(
     ctx: moderngl.Context, quality: str, theme: Theme, *, simplified: bool = False, fine: Collection[str] = ()
 ) -> moderngl.Program:
     """The program of skin; `simplified` samples its grain unfiltered, for live pictures drawn in software; `fine` :
-    attributes of parts that quality "full" draws by pixel, of :data:`FINE`."""
+    attributes of parts that quality "full" draws by pixel, of :data:`FINE`; and :data:`TEXTURE`."""
     defines: dict[str, int | str] = {"INSIDE": _INSIDE}
     scale: dict[str, int | str] = {"DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
+    textured = TEXTURE in fine and theme.use_painted
+    if textured:
+        defines["TEXTURE"] = 1
     if theme.lit:
         defines |= {"PANELS": 1} | scale
     if quality != "full":
         fragment = ("light.glsl", "panels.glsl", "panels_fast.frag") if theme.lit else ("flat.frag",)
+        if textured:
+            fragment = ("light.glsl", "texture.glsl", "textured_fast.frag")
         return build(ctx, ("light.glsl", "skin.glsl", "skin_fast.vert"), fragment, defines=defines)
     if theme.seams:
         defines |= {"SEAMS": 1} | scale
@@ -119,8 +131,8 @@ def skin_program(
     if simplified:
         defines["GRAIN_TEXELS"] = f"{_DETAIL_SIZE // 2}.0"
     shared = ("light.glsl", "skin.glsl")
-    panels = ("panels.glsl",) if theme.lit else ()
-    return build(ctx, (*shared, "skin.vert"), (*shared, *panels, "skin.frag"), defines=defines)
+    more = (*(("panels.glsl",) if theme.lit else ()), *(("texture.glsl",) if textured else ()))
+    return build(ctx, (*shared, "skin.vert"), (*shared, *more, "skin.frag"), defines=defines)
 
 
 def worn_program(ctx: moderngl.Context, name: str, quality: str, *, simplified: bool = False) -> moderngl.Program:
@@ -164,6 +176,8 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
     fine = {}
     if theme.use_painted and openings.lip_tint:
         fine["lips"] = attribute(part, "lips", (0.0,))  # of every part: they are drawn together
+    if theme.use_painted and "texture_uv" in part.attributes:
+        fine["texture_uv"] = part.attributes["texture_uv"]
     if "freckles" in part.attributes:
         fine["freckles"] = part.attributes["freckles"]
     lamp = {"lamp": openings.lip_line(part).astype(np.float32)[:, None]} if theme.lit else {}
@@ -224,6 +238,7 @@ def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[s
         "glow": theme.glow,
         "iris_radius": radius,
         "pupil_radius": _PUPIL * theme.pupil * radius,
+        "texture_rectangle": tuple(map(float, colours.get("texture_rectangle", _NOWHERE))),
         **openings.eye(part),
     }
 

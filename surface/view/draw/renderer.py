@@ -15,6 +15,7 @@ from surface.view.draw import materials
 from surface.view.draw.accessories import PROGRAMS, AccessoryBuffers, accessory_programs
 from surface.view.draw.evaluator import Evaluator, choose
 from surface.view.draw.programs import set_uniforms
+from surface.view.draw.textures import TEXTURE_UNIT, texture_of
 from surface.view.scene.bounds import Bands, Silhouette, corners
 from surface.view.scene.camera import Camera
 from surface.view.scene.framing import framing_of
@@ -68,6 +69,8 @@ class Renderer:
         self.openings = Openings(head.parts, lambda part, ids: self.evaluator.positions(part, ids), head.contacts)
         self._fine = ["freckles"] if any("freckles" in part.attributes for part in head.parts) else []
         self._fine += ["lips"] if self.openings.lip_tint else []
+        self._texture = texture_of(ctx, head, self.theme)
+        self._fine += [materials.TEXTURE] if self._texture is not None else []
         used = {materials.material_of(part.material).program for part in head.parts}
         self._worn = [name for name in materials.WORN if name in used]
         self._programs = materials.programs(ctx, quality, self.theme, fine=self._fine, worn=self._worn)
@@ -117,6 +120,8 @@ class Renderer:
         """
         if self._simplified or self.evaluator.name != "cpu":
             return
+        if self._texture is not None:
+            self._texture.simplify()
         self._simplified, old = True, [self._programs[name] for name in ("skin", *self._worn)]
         self._programs["skin"] = materials.skin_program(
             self.ctx, self.quality, self.theme, simplified=True, fine=self._fine
@@ -174,6 +179,8 @@ class Renderer:
         self.ctx.blend_func = self.ctx.SRC_ALPHA, self.ctx.ONE_MINUS_SRC_ALPHA
         self._aim(camera, width / max(height, 1))
         self._detail.use(0)
+        if self._texture is not None:
+            self._texture.texture.use(TEXTURE_UNIT)
         if self._accessories is not None:
             self._accessories.turn(self.evaluator.rotation())
             self._accessories.draw_solid(multisampled=target.samples > 1)
@@ -234,6 +241,9 @@ class Renderer:
         lights = {f"{name}_colour": getattr(theme, name).colour for name in ("key", "fill", "rim")}
         for program in self._programs.values():
             set_uniforms(program, {**lights, "sky": theme.sky, "ground": theme.ground, "detail": 0})
+        if self._texture is not None:
+            for name in ("skin", "eye"):
+                self._texture.set_uniforms(self._programs[name])
 
     def _aim(self, camera: Camera, aspect: float) -> None:
         """Set the uniforms of camera and lights, most of them only when the camera or the aspect ratio changed."""
@@ -257,6 +267,8 @@ class Renderer:
             thing.release()
         if self._accessories is not None:
             self._accessories.release()
+        if self._texture is not None:
+            self._texture.texture.release()
 
 
 class Rectangles:

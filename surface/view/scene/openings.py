@@ -26,7 +26,7 @@ _INNER = ("teeth", "tongue", "gums", "mouth")
 #: Vertices of an eyeball that its rotation is computed from.
 _SAMPLES = 48
 #: Attributes that are painted all over an eyeball.
-_PAINTED = ("iris", "sclera", "iris_radius")
+_PAINTED = ("iris", "sclera", "iris_radius", "texture_rectangle")
 #: How far, in eyeball radii, a lid loop's mean may lie from the eyeball's centre.
 _LID_REACH = 2.0
 #: How far, millimetres, the lips' mean may lie from the front of the teeth.
@@ -66,7 +66,8 @@ class EyeFrame:
     ids : (k,) vertices used.
     solve : (4, k) maps their positions to rotation times radius and centre (least squares).
     lids : the skin's opening over it, or None.
-    painted : what is painted on the eyeball, (k,) by attribute: "iris" and "sclera", colours, and "iris_radius".
+    painted : what is painted on the eyeball, (k,) by attribute: "iris" and "sclera", colours, "iris_radius", and
+        "texture_rectangle", where in the head's texture it is.
     """
 
     local: np.ndarray

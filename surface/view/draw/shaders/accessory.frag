@@ -19,11 +19,6 @@ in vec3 v_view;
 
 out vec4 colour;
 
-// sRGB to linear light, a cubic instead of a power.
-vec3 decoded(vec3 c) {
-    return c * (c * (c * 0.305306011 + 0.682171111) + 0.012522878);
-}
-
 // Opacity of a texture, made up for what its smaller versions lose: averaged, fine locks fall below every cutoff, and
 // hair that is far away would thin out (B. Golus, "Anti-aliased Alpha Test: The Esoteric Alpha To Coverage", 2017).
 float kept(float opacity) {

@@ -8,6 +8,10 @@ uniform vec3 sclera_colour;
 uniform float glow;                   // of the iris itself
 uniform float iris_radius;            // sine of the iris' half angle
 uniform float pupil_radius;
+#ifdef TEXTURE
+uniform sampler2D head_texture;
+uniform vec4 texture_rectangle;       // left, top, right, bottom of the eye's front; without an area where it has none
+#endif
 
 in vec3 v_local;
 in vec3 v_view;
@@ -74,6 +78,11 @@ void main() {
     float pupil = pupil_radius / iris_radius;
     float t = (q - pupil) / (1.0 - pupil);
     vec3 albedo = mix(iris(p, t), sclera(d, r), smoothstep(0.90, 1.06, q));
+#ifdef TEXTURE
+    vec2 size = texture_rectangle.zw - texture_rectangle.xy;
+    if (size.x > 0.0)
+        albedo = decoded(texture(head_texture, texture_rectangle.xy + size * (0.5 + 0.5 * vec2(p.x, -p.y))).rgb);
+#endif
 
     // The cornea is rounder than the eyeball: its normals lean out faster, which draws highlights to its middle.
     // They are made from directions alone, since the rim of a modelled cornea would split each lamp's image.

@@ -23,6 +23,11 @@ float lobe(float cosine, float sharpness) {
     return exp2(1.4427 * sharpness * (cosine - 1.0));
 }
 
+// sRGB to linear light, a cubic instead of a power.
+vec3 decoded(vec3 c) {
+    return c * (c * (c * 0.305306011 + 0.682171111) + 0.012522878);
+}
+
 // Filmic curve with the display's 2.2 gamma folded in (Hejl and Burgess-Dawson): one division, no pow.
 vec3 encode(vec3 linear) {
     vec3 x = max(vec3(0.0), linear - 0.004);

@@ -83,6 +83,9 @@ void main() {
 #ifdef LIPS
     lit *= lips();
 #endif
+#ifdef TEXTURE
+    lit *= textured();
+#endif
     lit += key_colour * ((wide * v_normal_wide.w + narrow * v_half_narrow.w) * (1.0 + PORES_DULL * grain.w));
 #ifdef FRECKLES
     lit *= mix(vec3(1.0), vec3(0.76, 0.62, 0.52), freckle());

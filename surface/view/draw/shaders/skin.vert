@@ -20,6 +20,10 @@ out float v_freckles;
 in float lips;              // 1 on lips, 0.5 at their edge
 out float v_lips;
 #endif
+#ifdef TEXTURE
+in vec2 texture_uv;         // in the head's own skin texture
+out vec2 v_texture;
+#endif
 #ifdef PANELS
 in float lamp;              // how much of the lamps' light it sends out
 out float v_lamp;
@@ -40,6 +44,9 @@ void main() {
 #endif
 #ifdef LIPS
     v_lips = lips;
+#endif
+#ifdef TEXTURE
+    v_texture = texture_uv;
 #endif
 #ifdef PANELS
     v_lamp = lamp;

@@ -15,6 +15,11 @@ in float lamp;                // how much of the lamps' light it sends out
 out vec3 v_light;
 out vec2 v_uv;
 out float v_lamp;
+#elif defined(TEXTURE)
+in vec2 texture_uv;           // in the head's own skin texture
+
+out vec3 v_light;
+out vec2 v_texture;
 #else
 out vec3 v_colour;
 #endif
@@ -35,6 +40,9 @@ void main() {
     v_light = lit;
     v_uv = surface_uv_gloss.xy;
     v_lamp = lamp;
+#elif defined(TEXTURE)
+    v_light = lit;
+    v_texture = texture_uv;
 #else
     v_colour = encode(lit);
 #endif

@@ -198,13 +198,13 @@ def test_an_island_fills_its_tile_and_runs_anticlockwise(mirrored: bool) -> None
     lean = np.array([[3.0, 5.0], [7.0, 5.5], [4.0, 7.0], [8.0, 6.5]]) * ([-1.0, 1.0] if mirrored else [1.0, 1.0])
     island = Island(np.arange(4), lean, np.array([[0, 1, 2, -1], [1, 3, 2, -1]]))
     for k in (0, 3):
-        placed = chart_module._place(island, k)
+        placed = chart_module.in_tile(island, k)
         assert placed.uv.min(axis=0).tolist() == [TILE * k, 0.0]
         assert np.ptp(placed.uv, axis=0).max() == pytest.approx(1.0)
         factor = -5.0 if mirrored else 5.0
         np.testing.assert_allclose((placed.uv[1:] - placed.uv[0]) * [factor, 5.0], lean[1:] - lean[0])
     point = Island(np.arange(3), np.ones((3, 2)), np.array([[0, 1, 2, -1]]))
-    assert np.isfinite(chart_module._place(point, 0).uv).all()
+    assert np.isfinite(chart_module.in_tile(point, 0).uv).all()
 
 
 def test_samples_know_the_longest_step_of_the_mesh_around_them() -> None:

@@ -1,0 +1,33 @@
+"""Look up the colours of a mesh's materials at places in its faces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from surface.base.arrays import Bools, Floats, Ints
+from surface.fit.source.mesh import FitMesh
+from surface.fit.source.textures import filtered, linear_picture
+from surface.readers.meshdata import Material
+
+
+def looked_up(mesh: FitMesh, faces: Ints, rows: Ints, share: Floats) -> Floats:
+    """(m, 4) linear RGB and opacity at places in faces (m,), of which the corners have these ``rows`` (m, 3) of texture
+    coordinates; 0 where nothing is known."""
+    out = np.zeros((len(faces), 4))
+    known = (faces >= 0) & (rows >= 0).all(axis=1)
+    for k in np.unique(mesh.piece[faces[known]]):
+        own: Bools = known & (mesh.piece[np.maximum(faces, 0)] == k)
+        material = mesh.materials[k] if mesh.materials else None
+        if material is not None:
+            out[own] = _of_material(material, np.einsum("mk,mkx->mx", share[own], mesh.uv[rows[own]]))
+    return out
+
+
+def _of_material(material: Material, uv: Floats) -> Floats:
+    picture = linear_picture(material.texture) if material.texture else None
+    if picture is None:
+        return np.zeros((len(uv), 4))
+    found = filtered(picture, material.in_picture(uv)) * material.colour
+    if material.alpha == "OPAQUE":
+        found[:, 3] = 1.0
+    return found
