@@ -7,10 +7,10 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from surface.base.arrays import Array, Floats32
 from surface.export.glb_buffers import ARRAY_BUFFER, ELEMENT_BUFFER, FLOAT, UINT, GlbBuffers
+from surface.export.head_texture import SAMPLER
 from surface.export.shapes import ExportPart
 from surface.export.textures import eye_column, materials, png_bytes
 from surface.export.worn import material_of, sampler_of
@@ -86,11 +86,10 @@ class Document(GlbBuffers):
         table = materials().get(part.material, materials()["skin"])
         painted = part.colours is not None
         name = f"{part.material}_painted" if painted else part.material
-        picture = eye_column(part) if "texture" in table else None
-        texture = None if picture is None else self._eye_texture(picture)
+        texture = self._picture_of(part, table)
         name += f"_{texture + 1}" if texture else ""
         if name not in self._materials:
-            colour = [1.0, 1.0, 1.0] if painted else table["colour"]
+            colour = [1.0, 1.0, 1.0] if painted or part.texture is not None else table["colour"]
             surface: dict[str, Any] = {
                 "baseColorFactor": [*colour, 1.0], "metallicFactor": 0.0, "roughnessFactor": table["roughness"],
             }  # fmt: skip
@@ -109,9 +108,14 @@ class Document(GlbBuffers):
         self._materials[key] = material
         return len(self._materials) - 1
 
-    def _eye_texture(self, picture: NDArray[np.uint8]) -> int:
-        """Return the index of a texture of eyes."""
-        return self._texture(png_bytes(picture), "image/png", "eye", EYE_SAMPLER)
+    def _picture_of(self, part: ExportPart, table: Mapping[str, Any]) -> int | None:
+        """Return the index of a part's texture: that of its head, or one that is drawn here of an eye; None without."""
+        own = part.texture
+        if own is not None:
+            return self._texture(own.picture, own.mime, part.material, SAMPLER)
+        if "texture" not in table:
+            return None
+        return self._texture(png_bytes(eye_column(part)), "image/png", "eye", EYE_SAMPLER)
 
     def _texture(self, picture: bytes, mime: str, name: str, sampler: dict[str, int]) -> int:
         """Return the index of a texture; the same one is kept once."""

@@ -245,14 +245,14 @@ class _WebDocument(GlbBuffers):
         """Return the index of a part's material; the same one is kept once."""
         if one.part.worn is not None:
             return self._worn_material(one.part.worn)
-        kind, picture = one.part.material, _picture(one)
-        key = kind, b"" if picture is None else png_bytes(picture)
+        kind, (picture, mime) = one.part.material, _picture(one)
+        key = kind, picture
         if key not in self._known:
             self._known[key] = len(self._materials)
             table = materials().get(kind, materials()["skin"])
             surface: dict[str, Any] = {"metallicFactor": 0.0, "roughnessFactor": table["roughness"]}
-            if picture is not None:
-                surface["baseColorTexture"] = {"index": self._texture(kind, key[1])}
+            if picture:
+                surface["baseColorTexture"] = {"index": self._texture(kind, picture, mime)}
             self._materials.append({"name": kind, "pbrMetallicRoughness": surface, **_blending(kind, table)})
         return self._known[key]
 
@@ -283,7 +283,15 @@ def _blending(kind: str, table: dict[str, Any]) -> dict[str, Any]:
     return {**two_sided, "alphaMode": "MASK", "alphaCutoff": STRAND_CUTOFF} if kind in _HAIR else two_sided
 
 
-def _picture(one: WebPart) -> Picture | None:
+def _picture(one: WebPart) -> tuple[bytes, str]:
+    """Return a part's picture and its kind: of its head's texture, or drawn here; empty without one."""
+    if one.part.texture is not None:
+        return one.part.texture.picture, one.part.texture.mime
+    drawn = _drawn_picture(one)
+    return (b"", "") if drawn is None else (png_bytes(drawn), "image/png")
+
+
+def _drawn_picture(one: WebPart) -> Picture | None:
     kind = one.part.material
     if kind == "eye":
         return eye_picture(one.part)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Floats32, Ints
+from surface.export.head_texture import Worn, texture_of, tinted
 from surface.head import Head
 from surface.head.model.accessories import Accessory
 from surface.head.model.parameters import SHAPES, TONGUE_JAW
@@ -31,6 +32,7 @@ class ExportPart:
     painted : what is painted all over an eyeball, by name: "iris" and "sclera", linear RGB, and "iris_radius".
     displacements, normal_changes : by shape, (m, 3) float32: what it adds to vertices and normals.
     worn : the accessory that this is; None for a part of the head.
+    texture : what it shows of its head's texture, at ``uv``; None where it shows nothing.
     """
 
     name: str
@@ -45,6 +47,7 @@ class ExportPart:
     normal_changes: dict[str, Floats32] = field(default_factory=dict)
     painted: dict[str, Floats32] = field(default_factory=dict)
     worn: Accessory | None = None
+    texture: Worn | None = None
 
 
 def export_parts(head: Head, pose: Mapping[str, float] | None = None, *, shapes: bool = True) -> list[ExportPart]:
@@ -53,11 +56,12 @@ def export_parts(head: Head, pose: Mapping[str, float] | None = None, *, shapes:
     out = []
     for part in head.parts:
         pivot = head.data.eyes[_EYES.index(part.follows)].copy() if part.follows in _EYES else np.zeros(3)
-        colours = part.attributes.get("albedo")
+        colours, texture = part.attributes.get("albedo"), texture_of(head, part)
         if colours is not None:
             occlusion = part.attributes.get("occlusion", np.float32(1.0))
-            colours = np.clip(colours * np.sqrt(occlusion), 0.0, 1.0).astype(np.float32)
-        vertices, normals, uv = part.vertices.copy(), unit(part.normals), _in_unit_square(part.uv)
+            colours = np.clip(tinted(colours, texture) * np.sqrt(occlusion), 0.0, 1.0).astype(np.float32)
+        vertices, normals = part.vertices.copy(), unit(part.normals)
+        uv = _in_unit_square(part.uv if texture is None else texture.uv)
         out.append(
             ExportPart(
                 part.name,
@@ -69,6 +73,7 @@ def export_parts(head: Head, pose: Mapping[str, float] | None = None, *, shapes:
                 pivot,
                 colours,
                 painted={key: part.attributes[key][0] for key in _PAINTED if key in part.attributes},
+                texture=texture,
             )
         )
     for name, base in shapes_of(head).items() if shapes else ():

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Floats32, Ints
+from surface.export.head_texture import tinted
 from surface.export.shapes import ExportPart, export_parts, unit
 from surface.export.textures import EYE_RIM, materials
 from surface.export.worn import accessory_parts
@@ -101,8 +102,9 @@ def _add_material_data(part: ExportPart, own: HeadPart, kept: Ints, front: float
     a = _Attributes(own, kept)
     table = materials().get(part.material, materials()["skin"])
     plain = np.asarray(table["colour"], np.float32)
+    shown = None if part.texture is None else (part.uv * [1, -1] + [0, 1]).astype(np.float32)
     if part.material == "eye":
-        return WebPart(part, _rgba(np.ones(3), 1.0, len(kept)), _eye_uv(part))
+        return WebPart(part, _rgba(np.ones(3), 1.0, len(kept)), _eye_uv(part) if shown is None else shown)
     if part.material in ("brow", "lash"):
         strength = a("strength", 1.0) * (_lash_strength(part.vertices, own, kept) if part.material == "lash" else 1.0)
         return WebPart(part, _rgba(a("albedo", plain), strength, len(kept)), _strip_uv(own, kept))
@@ -115,12 +117,12 @@ def _add_material_data(part: ExportPart, own: HeadPart, kept: Ints, front: float
     if part.material in _INNER:
         deep = np.exp(-np.maximum(front - part.vertices[:, 2:], 0.0) / _DEEP_MM)
         return WebPart(part, _rgba(plain * np.sqrt(open_) * deep, 1.0, len(kept)))
-    colours = _rgba(a("albedo", plain) * np.sqrt(open_), open_, len(kept))
+    colours = _rgba(tinted(a("albedo", plain), part.texture) * np.sqrt(open_), open_, len(kept))
     if part.material != "skin":
         return WebPart(part, colours)
     surface = np.hstack([a("gloss", 0.3), a("thin", 0.0), np.zeros((len(kept), 2), np.float32)])
     return WebPart(
-        part, colours, baked={"_VISIBLE": _bytes(a("visible", (0.75, 0.5, 0.5, 0.5))), "_SKIN": _bytes(surface)}
+        part, colours, shown, baked={"_VISIBLE": _bytes(a("visible", (0.75, 0.5, 0.5, 0.5))), "_SKIN": _bytes(surface)}
     )
 
 

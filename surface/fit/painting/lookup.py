@@ -27,7 +27,7 @@ def _of_material(material: Material, uv: Floats) -> Floats:
     picture = linear_picture(material.texture) if material.texture else None
     if picture is None:
         return np.zeros((len(uv), 4))
-    found = filtered(picture, material.in_picture(uv)) * material.colour
     if material.alpha == "OPAQUE":
-        found[:, 3] = 1.0
+        picture[..., 3] = 1.0
+    found: Floats = filtered(picture, material.in_picture(uv)) * [*material.colour[:3], 1.0]
     return found

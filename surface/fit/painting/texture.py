@@ -61,8 +61,8 @@ def _laid_out(squares: Sequence[Square], tone: Floats) -> tuple[Floats, Floats32
 
 
 def _places(sides: Sequence[int]) -> tuple[list[tuple[int, int]], int, int]:
-    """Left and top of each square, by its side, and the width and height of the picture that holds them: the largest
-    side says how high columns are."""
+    """Left and top of each square, by its side, and the width and height of the picture that holds them, which are
+    equal, so that no other program finds its texture coordinates stretched."""
     height = max(*sides, SMALL_SIDE)
     places, x, y, wide = list[tuple[int, int]](), 0, 0, 0
     for side in sides:
@@ -70,4 +70,5 @@ def _places(sides: Sequence[int]) -> tuple[list[tuple[int, int]], int, int]:
             x, y, wide = x + wide, 0, 0
         places.append((x, STRIP + y))
         y, wide = y + side, max(wide, side)
-    return places, x + wide, STRIP + height
+    whole = max(x + wide, STRIP + height)
+    return places, whole, whole

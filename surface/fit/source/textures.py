@@ -133,7 +133,11 @@ def linear_picture(data: bytes) -> Floats | None:
 
 
 def filtered(picture: Floats, at: Floats) -> Floats:
-    """(m, 4) a picture (h, w, 4) at places (m, 2), 0..1 right and down, linear between its pixels; pictures repeat."""
+    """(m, 4) a picture (h, w, 4) at places (m, 2), 0..1 right and down, linear between its pixels; pictures repeat.
+
+    Colours are weighted by opacity: painters leave any colour where a picture is clear.
+    """
+    picture = np.concatenate([picture[..., :3] * picture[..., 3:], picture[..., 3:]], axis=-1)
     size = np.array(picture.shape[1::-1])
     place = at * size - 0.5
     low = np.floor(place).astype(np.int64)
@@ -142,6 +146,7 @@ def filtered(picture: Floats, at: Floats) -> Floats:
     above = (1.0 - x) * picture[top, left] + x * picture[top, right]
     below = (1.0 - x) * picture[bottom, left] + x * picture[bottom, right]
     mixed: Floats = (1.0 - y) * above + y * below
+    mixed[:, :3] /= np.maximum(mixed[:, 3:], 1e-9)
     return mixed
 
 

@@ -26,6 +26,7 @@ vec3 wrapped(float cosine, vec3 wrap) {
   return t * mix(t, vec3(1.0), 0.45);
 }
 float lobe(float cosine, float sharpness) { return exp2(1.4427 * sharpness * (cosine - 1.0)); }
+vec3 decoded(vec3 c) { return c * (c * (c * 0.305306011 + 0.682171111) + 0.012522878); }
 vec3 encode(vec3 linear) {
   vec3 x = max(vec3(0.0), linear - 0.004);
   return (x * (6.2 * x + 0.5)) / (x * (6.2 * x + 1.7) + 0.06);
@@ -51,7 +52,7 @@ void place() {
 const SKIN = [`
 attribute vec4 color, _visible, _skin;
 uniform vec3 key_at_rest, rim_at_rest;
-varying vec3 v_diffuse; varying vec4 v_normal_wide, v_half_narrow;
+varying vec3 v_diffuse; varying vec4 v_normal_wide, v_half_narrow; varying vec2 v_map;
 float reaching(vec3 light) { return smoothstep(0.05, 0.95, dot(_visible - 0.5, vec4(4.0, 4.0 * light))); }
 float grazing() { float e = 1.0 - clamp(dot(n, v), 0.0, 1.0); e *= e; return e * e; }
 void main() {
@@ -72,12 +73,18 @@ void main() {
   float strength = (1.0 + 5.0 * grazing()) * clamp(4.0 * dot(n, key_direction), 0.0, 1.0) * occlusion * sun;
   v_normal_wide = vec4(n, 0.050 * strength);
   v_half_narrow = vec4(normalize(key_direction + v), 0.24 * _skin.x * strength);
+  v_map = uv;
 }`, `
-varying vec3 v_diffuse; varying vec4 v_normal_wide, v_half_narrow;
+uniform sampler2D map;
+varying vec3 v_diffuse; varying vec4 v_normal_wide, v_half_narrow; varying vec2 v_map;
 void main() {
   float wide = lobe(dot(normalize(v_normal_wide.xyz), v_half_narrow.xyz), 9.0), narrow = wide * wide;
   narrow *= narrow;
-  vec3 lit = encode(v_diffuse + key_colour * (wide * v_normal_wide.w + narrow * v_half_narrow.w));
+  vec3 diffuse = v_diffuse;
+  #ifdef MAPPED
+  diffuse *= decoded(texture2D(map, v_map).rgb);
+  #endif
+  vec3 lit = encode(diffuse + key_colour * (wide * v_normal_wide.w + narrow * v_half_narrow.w));
   gl_FragColor = vec4(gl_FrontFacing ? lit : 0.25 * lit, 1.0);
 }`];
 
@@ -203,7 +210,6 @@ void main() {
 }`, `
 uniform float alpha_test; uniform bool blended;
 varying vec3 v_light, v_colour, v_shine; varying vec3 v_uv;
-vec3 decoded(vec3 c) { return c * (c * (c * 0.305306011 + 0.682171111) + 0.012522878); }
 void main() {
   vec4 texel = vec4(1.0);
   #ifdef MAPPED
@@ -237,7 +243,7 @@ export function material(kind, given, bends) {
   const blended = vertex === HAIR[0];
   return new THREE.ShaderMaterial({
     uniforms: { ...shared, map: { value: map } }, side, transparent: blended, depthWrite: !blended,
-    defines: bends ? { BENDS: 1 } : {},
+    defines: { ...(bends ? { BENDS: 1 } : {}), ...(map ? { MAPPED: 1 } : {}) },
     vertexShader: LIGHT + PLACE + vertex, fragmentShader: LIGHT + fragment,
   });
 }

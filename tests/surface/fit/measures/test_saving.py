@@ -16,14 +16,18 @@ from surface.fit.measures import saving
 from surface.fit.measures.saving import ASIDE, save_head
 from surface.head import Head
 from surface.head.model.accessories import FILE, read_accessories
+from surface.head.model.texture import FILE as TEXTURE
+from surface.head.model.texture import HeadTexture
 from surface.head.posing.fit_error import FIT_ERROR
+
+SKIN = HeadTexture(b"\x89PNG", (0.5, 0.5, 0.5), {})
 
 
 @pytest.fixture
 def place(tmp_path: Path) -> Path:
-    """A folder with a head that wears a card and knows how far it is from its mesh."""
+    """A folder with a head that wears a card, has a texture and knows how far it is from its mesh."""
     data = small_head()
-    save_head(tmp_path, data, {"a": np.zeros(len(Head(data).part("a").vertices))}, [card()])
+    save_head(tmp_path, data, {"a": np.zeros(len(Head(data).part("a").vertices))}, [card()], SKIN)
     return tmp_path
 
 
@@ -32,7 +36,7 @@ def files(folder: Path) -> dict[str, bytes]:
 
 
 def test_a_new_head_has_only_its_own(place: Path) -> None:
-    assert set(files(place)) == {"head.toml", "head.npz", FIT_ERROR, FILE}
+    assert set(files(place)) == {"head.toml", "head.npz", FIT_ERROR, FILE, TEXTURE}
     save_head(place, small_head(), {}, [replace(card(), name="Other")])
     assert [one.name for one in read_accessories(place)] == ["Other"]
     (place / (FILE + ASIDE)).write_bytes(b"of one that was killed")
@@ -55,7 +59,7 @@ def test_the_old_head_keeps_everything_if_the_new_one_cannot_be_written(
     with pytest.raises(type(error)):
         save_head(place, small_head(), {}, [])
     assert files(place) == before
-    assert seen == [{"head.toml", "head.npz", FIT_ERROR + ASIDE, FILE + ASIDE}], "killed here, nothing is lost or mixed"
+    assert seen == [{"head.toml", "head.npz", FIT_ERROR + ASIDE, FILE + ASIDE, TEXTURE + ASIDE}], "killed here, nothing is lost or mixed"
 
 
 @pytest.mark.parametrize("name", ["write_fit_error", "write_accessories"])
