@@ -59,7 +59,8 @@ def test_the_old_head_keeps_everything_if_the_new_one_cannot_be_written(
     with pytest.raises(type(error)):
         save_head(place, small_head(), {}, [])
     assert files(place) == before
-    assert seen == [{"head.toml", "head.npz", FIT_ERROR + ASIDE, FILE + ASIDE, TEXTURE + ASIDE}], "killed here, nothing is lost or mixed"
+    aside = {file + ASIDE for file in (FIT_ERROR, FILE, TEXTURE)}
+    assert seen == [{"head.toml", "head.npz", *aside}], "killed here, nothing is lost or mixed"
 
 
 @pytest.mark.parametrize("name", ["write_fit_error", "write_accessories"])

@@ -71,7 +71,7 @@ def test_a_ball_shows_its_front_as_it_is_seen_from_afar() -> None:
 def test_an_iris_is_seen_before_a_white_whose_rim_lies_before_it_and_lets_through_what_is_clear() -> None:
     half = np.zeros((256, 256, 4))
     half[:, :128], half[:, 128:] = (*BROWN, 255), (*GREEN, 0)
-    iris = [(f"Iris_{n[3:]}", disc(np.add(c, [3.0, 0, 6.0]), 5.0)) for (n, _), c in zip(pair(shell), CENTRES, strict=True)]
+    iris = pair(lambda c: disc(np.add(c, [3.0, 0, 6.0]), 5.0), ("Iris_Left", "Iris_Right"))
     mesh = joined([("Head", face()), *pair(lambda c: shell(c, reach=1.4)), *iris])
     clear = Material(texture=encoded(half), alpha="BLEND")
     left, right = looks(mesh, plain(WHITE), plain(WHITE), clear, clear)
@@ -82,7 +82,7 @@ def test_an_iris_is_seen_before_a_white_whose_rim_lies_before_it_and_lets_throug
 
 
 def test_corneas_and_highlights_are_not_part_of_it() -> None:
-    cover = [(f"Cornea_{n[3:]}", shell(c, 1.05 * RADIUS)) for (n, _), c in zip(pair(shell), CENTRES, strict=True)]
+    cover = pair(lambda c: shell(c, 1.05 * RADIUS), ("Cornea_Left", "Cornea_Right"))
     mesh = joined([("Head", face()), *pair(shell), *cover])
     for picture in looks(mesh, plain(WHITE), plain(WHITE), plain(GREEN), plain(GREEN)):
         np.testing.assert_allclose(at(picture, 0.0, 0.0), WHITE, atol=3)
