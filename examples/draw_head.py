@@ -4,7 +4,7 @@
 
 It evaluates Eq. (1) at the stored vertices, after groups, rules and the jaw have moved the control points. What needs
 more than the two files say is left out: contacts of lips and lids, gaze, the head's rotation, seams and paint; and so
-are accessories, such as hair that the head wears as a mesh, which lie in a file of their own.
+are accessories, such as hair that the head wears as a mesh, and textures, which lie in files of their own.
 """
 
 from __future__ import annotations
