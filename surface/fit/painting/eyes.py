@@ -11,10 +11,9 @@ from surface.base.arrays import Floats, Ints
 from surface.fit.eyes.colours import faces_by_side
 from surface.fit.eyes.names import is_cover, is_iris
 from surface.fit.eyes.search import Eyes
-from surface.fit.painting.lookup import looked_up
+from surface.fit.painting.lookup import looked_up, spread
 from surface.fit.painting.raster import covering
 from surface.fit.source.mesh import FitMesh, face_of_triangles, triangles
-from surface.fit.source.pictures import filled
 
 SIDE = 256  # texels along the picture of an eye
 LEAST = 0.1  # of the picture, which must be covered: an iris alone covers more
@@ -47,10 +46,10 @@ def _picture(mesh: FitMesh, faces: Ints, centre: Floats, radius: float) -> Float
         cover = rgba[..., 3:]
         total[..., :3] = cover * rgba[..., :3] + (1.0 - cover) * total[..., :3]
         total[..., 3:] = cover + (1.0 - cover) * total[..., 3:]
-    weight = np.where(total[..., 3] >= SEEN, 1.0, 0.0)
-    if weight.mean() < LEAST:
+    known = total[..., 3] >= SEEN
+    if known.mean() < LEAST:
         return None
-    return filled(total[..., :3] / np.maximum(total[..., 3:], SEEN) * weight[..., None], weight)
+    return spread(total[..., :3] / np.maximum(total[..., 3:], SEEN), known)
 
 
 def _from_the_back(mesh: FitMesh, faces: Ints, at: Floats) -> list[int]:

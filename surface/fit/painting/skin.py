@@ -8,16 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.painting.lookup import looked_up
+from surface.fit.painting.lookup import looked_up, pixels_of, spread
 from surface.fit.painting.raster import covering
 from surface.fit.source.chart import in_tile
 from surface.fit.source.islands import FaceNumbers, Island, face_numbers, faces_of, texture_corners
 from surface.fit.source.mesh import FitMesh, face_of_triangles, triangles
-from surface.fit.source.pictures import filled
 from surface.head.model.texture import TILE
 
-SIDE, SMALL_SIDE = 1024, 512
-"""Texels along a tile of the first part, which is the face, and of the others."""
+SIDES = 2048, 1024, 512
+"""Texels along a tile of the first part, which is the face: as few as its texture has, but not fewer than the last but
+one, unless the whole becomes too large."""
+OTHERS = 0.5  # of that, texels along tiles of other parts
+BLOCK = 8  # texels of a side of a JPEG's blocks, which no two tiles share
 FEWEST = 32  # texels along the smallest tile
 LEAST = 0.2  # of a tile of the face that must have colours from a texture
 OPAQUE = 0.5  # opacity from which on a texel's colour is the skin's
@@ -46,14 +48,18 @@ class Square:
     known: float = 1.0
 
 
-def skin_squares(mesh: FitMesh, parts: Sequence[SkinIslands], colour: Floats) -> dict[str, list[Square]]:
+def skin_squares(
+    mesh: FitMesh, parts: Sequence[SkinIslands], colour: Floats, largest: int = SIDES[0]
+) -> dict[str, list[Square]]:  # fmt: skip
     """Pictures of each tile of each part; none where the first part, the face, has hardly any texture.
 
-    colour : (3,) linear RGB of what has no texture.
+    colour : (3,) linear RGB of what has no texture. largest : texels along a tile that no tile has more of.
     """
     numbers, out = face_numbers(mesh), dict[str, list[Square]]()
+    face = _placed(parts[0], 0)
+    whole = min(largest, SIDES[0] if _density(mesh, face, numbers) > SIDES[1] else SIDES[1])
     for part in parts:
-        side = SMALL_SIDE if out else SIDE
+        side = int(OTHERS * whole) if out else whole
         made = [_square(mesh, part, k, numbers, side, colour) for k in range(len(part.islands))]
         if not out and made[0].known < LEAST:
             return {}
@@ -61,21 +67,47 @@ def skin_squares(mesh: FitMesh, parts: Sequence[SkinIslands], colour: Floats) ->
     return out
 
 
+def _placed(part: SkinIslands, k: int) -> Island:
+    """The k-th island of a part as it lies in (u, v)."""
+    return in_tile(part.islands[k], k) if part.tiled else part.islands[k]
+
+
+def _density(mesh: FitMesh, island: Island, numbers: FaceNumbers) -> float:
+    """How many pixels of its textures lie along one unit of an island's (u, v): the median of its triangles; 0 without
+    a texture that can be read."""
+    own = faces_of(island, numbers)
+    rows, faces = texture_corners(mesh, island, own), own[face_of_triangles(island.faces)]
+    known = (faces >= 0) & (rows >= 0).all(axis=1)
+    if not known.any():
+        return 0.0
+    sizes = np.array([pixels_of(m) if m is not None else 0.0 for m in mesh.materials])
+    areas = _areas(mesh.uv[rows[known]]), _areas(island.uv[triangles(island.faces)[known]])
+    ratio = areas[0] * sizes[mesh.piece[faces[known]]] / np.maximum(areas[1], 1e-12)
+    return float(np.sqrt(np.median(ratio)))
+
+
+def _areas(corner: Floats) -> Floats:
+    """(t,) areas of triangles (t, 3, 2)."""
+    a, b = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    areas: Floats = 0.5 * np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+    return areas
+
+
 def _square(
     mesh: FitMesh, part: SkinIslands, k: int, numbers: FaceNumbers, side: int, colour: Floats
 ) -> Square:  # fmt: skip
     """One tile, of which the whole would have ``side`` texels. Beside its island, and where its texture is clear, it
     has the colours that are nearest."""
-    island = in_tile(part.islands[k], k) if part.tiled else part.islands[k]
+    island = _placed(part, k)
     own = faces_of(island, numbers)
     rows, faces = texture_corners(mesh, island, own), own[face_of_triangles(island.faces)]
     at = (island.uv[triangles(island.faces)] - [TILE * k, 0.0]) * side
-    whole, side = side, int(np.clip(np.ceil(at.max()), FEWEST, side))
+    whole, side = side, int(np.clip(BLOCK * np.ceil(at.max() / BLOCK), FEWEST, side))
     owner, share = covering(np.ascontiguousarray(at), side, side)
     seen = owner >= 0
     rgba = np.zeros((side, side, 4))
     rgba[seen] = looked_up(mesh, faces[owner[seen]], rows[owner[seen]], share[seen])
-    weight = np.where(rgba[..., 3] >= OPAQUE, 1.0, 0.0)
-    if not weight.any():
+    known = rgba[..., 3] >= OPAQUE
+    if not known.any():
         return Square(np.tile(colour, (side, side, 1)), side / whole, 0.0)
-    return Square(filled(rgba[..., :3] * weight[..., None], weight), side / whole, float(weight.mean()))
+    return Square(spread(rgba[..., :3], known), side / whole, float(known.mean()))

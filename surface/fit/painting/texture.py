@@ -10,12 +10,13 @@ from surface.base.arrays import Floats, Floats32
 from surface.fit.eyes.colours import skin_colour
 from surface.fit.eyes.search import Eyes
 from surface.fit.painting.eyes import eye_pictures
-from surface.fit.painting.skin import SMALL_SIDE, SkinIslands, Square, skin_squares
+from surface.fit.painting.skin import SIDES, SkinIslands, Square, skin_squares
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.pictures import encoded
 from surface.head.model.texture import HeadTexture
 from surface.readers.meshdata import srgb
 
+MOST = 4096  # texels of a side of the whole
 STRIP = 16  # rows of texels above the others that have the skin's own colour
 EYES = "eye_left", "eye_right"
 PLAIN = 0.5, 0.5, 0.5  # linear RGB of skin of which nothing is known
@@ -31,12 +32,18 @@ def head_texture(mesh: FitMesh, eyes: Eyes, parts: Sequence[SkinIslands]) -> tup
         return None, []
     found = skin_colour(mesh, eyes.skin)
     tone = np.array(PLAIN) if found is None else found
-    squares = skin_squares(mesh, parts, tone) if found is not None else {}
-    skin = list(squares)
-    squares |= {name: [Square(p)] for name, p in zip(EYES, eye_pictures(mesh, eyes), strict=True) if p is not None}
-    if not squares:
+    fronts = {name: [Square(p)] for name, p in zip(EYES, eye_pictures(mesh, eyes), strict=True) if p is not None}
+    for largest in SIDES:
+        skin = skin_squares(mesh, parts, tone, largest) if found is not None else {}
+        squares = skin | fronts
+        every = [square for own in squares.values() for square in own]
+        if not every or _places([len(square.colour) for square in every])[1] <= MOST:
+            break
+    else:
+        return None, [f"textures not drawn: skin in {len(every)} pieces is too much for one of {MOST} pixels"]
+    if not every:
         return None, []
-    picture, rectangles = _laid_out([square for own in squares.values() for square in own], tone)
+    picture, rectangles = _laid_out(every, tone)
     ends = np.cumsum([0, *map(len, squares.values())])
     tiles = {name: rectangles[a:b] for name, a, b in zip(squares, ends, ends[1:], strict=False)}
     what = " and ".join(["skin"] * bool(skin) + ["eyes"] * (len(squares) > len(skin)))
@@ -63,7 +70,7 @@ def _laid_out(squares: Sequence[Square], tone: Floats) -> tuple[Floats, Floats32
 def _places(sides: Sequence[int]) -> tuple[list[tuple[int, int]], int, int]:
     """Left and top of each square, by its side, and the width and height of the picture that holds them, which are
     equal, so that no other program finds its texture coordinates stretched."""
-    height = max(*sides, SMALL_SIDE)
+    height = max(sides)
     places, x, y, wide = list[tuple[int, int]](), 0, 0, 0
     for side in sides:
         if y + side > height or side > wide > 0:

@@ -61,10 +61,12 @@ def _reduced(image: Any, *, clear: bool) -> bytes:
 
 
 def encoded(pixels: NDArray[np.uint8]) -> bytes:
-    """A picture (h, w, 3) as a JPEG file."""
+    """A picture (h, w, 3) as a JPEG file, in blocks of 8 x 8 pixels: no colour spreads from one to the next."""
     from PIL import Image  # optional: the extra view
 
-    return _encoded(Image.fromarray(pixels), "JPEG")
+    out = io.BytesIO()
+    Image.fromarray(pixels).save(out, "JPEG", quality=QUALITY, subsampling=0)
+    return out.getvalue()
 
 
 def _encoded(image: Any, kind: str) -> bytes:
@@ -80,14 +82,14 @@ def bled(pixels: NDArray[np.uint8]) -> NDArray[np.uint8]:
     averaged in ever larger blocks, weighted by opacity, and taken from the finest that has any.
     """
     weight = np.where(pixels[..., 3] >= CLEAR * 255.0, pixels[..., 3] / 255.0, 0.0)
-    around = filled(pixels[..., :3].astype(float) * weight[..., None], weight)
+    around = _filled(pixels[..., :3].astype(float) * weight[..., None], weight)
     out = pixels.copy()
     keep = (pixels[..., 3:] / 255.0 / CLEAR).clip(0.0, 1.0) ** 2
     out[..., :3] = np.rint(keep * pixels[..., :3] + (1.0 - keep) * around).astype(np.uint8)
     return out
 
 
-def filled(colour: Floats, weight: Floats) -> Floats:
+def _filled(colour: Floats, weight: Floats) -> Floats:
     """(h, w, 3) mean colours of a picture of colours times weights (h, w); from coarser ones where a place has none."""
     height, width = weight.shape
     own = colour / np.maximum(weight, 1e-6)[..., None]
@@ -97,6 +99,6 @@ def filled(colour: Floats, weight: Floats) -> Floats:
     padded = np.zeros((h, w, 4))
     padded[:height, :width, :3], padded[:height, :width, 3] = colour, weight
     half = padded.reshape(h // 2, 2, w // 2, 2, 4).sum(axis=(1, 3)) / 4.0
-    coarse = filled(half[..., :3], half[..., 3])
+    coarse = _filled(half[..., :3], half[..., 3])
     spread = np.repeat(np.repeat(coarse, 2, axis=0), 2, axis=1)[:height, :width]
     return np.where(weight[..., None] > 1e-4, own, spread)

@@ -114,17 +114,18 @@ def average_colour(data: bytes) -> Floats | None:
     return mean
 
 
-def linear_picture(data: bytes) -> Floats | None:
-    """(h, w, 4) linear RGB and opacity of an encoded picture; None where it or Pillow cannot be read."""
+def linear_picture(data: bytes, largest: int = LARGEST) -> Floats | None:
+    """(h, w, 4) linear RGB and opacity of an encoded picture, reduced to ``largest`` pixels to each side; None where it
+    or Pillow cannot be read."""
     try:
         from PIL import Image  # optional: the extra view
 
         with Image.open(io.BytesIO(data)) as image:
             if image.width * image.height > MOST_PIXELS:
                 return None
-            image.draft("RGB", (LARGEST, LARGEST))
+            image.draft("RGB", (largest, largest))
             small = eight_bits(image).convert("RGBA")
-            small.thumbnail((LARGEST, LARGEST))
+            small.thumbnail((largest, largest))
             pixels = np.asarray(small, float) / 255.0
     except (ImportError, OSError, ValueError, SyntaxError, Image.DecompressionBombError):
         return None

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from surface.fit.painting.skin import FEWEST, SIDE, SMALL_SIDE, SkinIslands, skin_squares
+from surface.fit.painting.skin import FEWEST, OTHERS, SIDES, SkinIslands, skin_squares
 from surface.fit.source.islands import Island
 from surface.fit.source.mesh import FitMesh
 from surface.fit.source.textures import linear
@@ -16,6 +16,8 @@ from surface.head.model.texture import TILE
 from surface.readers.meshdata import Material
 
 Image = pytest.importorskip("PIL.Image")
+LARGE_SIDE, SIDE, _ = SIDES
+SMALL_SIDE = int(OTHERS * SIDE)
 GREY = np.array([0.2, 0.2, 0.2])
 SIZE = 64
 
@@ -66,7 +68,9 @@ def test_the_materials_own_colour_counts_and_what_is_clear_gets_the_colours_besi
     (square,) = skin_squares(mesh, [SkinIslands("face", [island], False)], GREY)["face"]
     assert 0.45 < square.known < 0.55
     assert square.colour[..., 0].max() < 0.5 * linear(np.array(0.52)), "nothing of the clear half, halved"
-    assert (square.colour[: SIDE // 4, SIDE // 2, 0] > 0.02).all(), "filled from the half that is known"
+    edge = square.colour[: SIDE // 2 - 8, SIDE // 2]
+    np.testing.assert_allclose(edge, np.broadcast_to(square.colour[SIDE // 2 - 8, SIDE // 2], edge.shape), atol=0.02)
+    assert (edge[:, 0] > 0.08).all(), "the colour beside it, not a mean of all that is known"
 
 
 def test_tiles_of_a_part_that_is_small_are_small_and_lie_where_its_islands_do() -> None:
@@ -87,6 +91,15 @@ def test_islands_that_are_to_be_tiled_fill_their_tiles() -> None:
     (square,) = skin_squares(mesh, [SkinIslands("face", [shrunk], True)], GREY)["face"]
     (whole,) = skin_squares(mesh, [SkinIslands("face", [island], False)], GREY)["face"]
     np.testing.assert_allclose(square.colour[20:-20, 20:-20], whole.colour[20:-20, 20:-20], atol=0.01)
+
+
+@pytest.mark.parametrize(("pixels", "side"), [(1000, SIDE), (1050, LARGE_SIDE), (4096, LARGE_SIDE)])
+def test_a_texture_with_more_pixels_gets_a_larger_square(pixels: int, side: int) -> None:
+    out = io.BytesIO()
+    Image.new("RGB", (pixels, pixels), (200, 150, 120)).save(out, "JPEG")
+    mesh, island = sheet(Material(texture=out.getvalue()))
+    found = skin_squares(mesh, [SkinIslands("face", [island], False), SkinIslands("back", [island], False)], GREY)
+    assert [len(found[name][0].colour) for name in ("face", "back")] == [side, OTHERS * side]
 
 
 @pytest.mark.parametrize("material", [Material(), Material(texture=b"no picture")])
