@@ -60,7 +60,7 @@ def test_skin_and_each_eye_have_their_own_rectangle_and_the_first_texel_is_the_t
     for name, colour in (("eye_left", BROWN), ("eye_right", GREEN)):
         left, top, right, bottom = texture.tiles[name][0]
         for place in ((left, top), (right - 1e-4, bottom - 1e-4), (0.5 * (left + right), 0.5 * (top + bottom))):
-            np.testing.assert_allclose(at(texture, place), colour, atol=12)
+            np.testing.assert_allclose(at(texture, place), colour, atol=4)
     pixels = picture(texture)
     assert pixels.shape[0] == pixels.shape[1], "square, so that texture coordinates in it are not stretched"
     np.testing.assert_allclose(pixels[: STRIP - 8, :64], np.broadcast_to(SKIN, (STRIP - 8, 64, 3)), atol=4)

@@ -31,7 +31,7 @@ def encoded(*bands: tuple[int, int, int]) -> bytes:
     return out.getvalue()
 
 
-def drawn(data: bytes | None, *, eye: bool = False, **given: Any) -> np.ndarray:
+def drawn(data: bytes | None, *, eye: bool = False, hurry: bool = False, **given: Any) -> np.ndarray:
     """A ball whose left half, or whose eyes, have a texture."""
     head: Any = BallHead()
     for part in head.parts:
@@ -47,6 +47,8 @@ def drawn(data: bytes | None, *, eye: bool = False, **given: Any) -> np.ndarray:
     if data is not None:
         head.texture = HeadTexture(data, TONE, {})
     with Offscreen(head, SIZE, **given) as screen:
+        if hurry:
+            screen.renderer.hurry()
         return screen.render(values()).astype(int)
 
 
@@ -56,9 +58,11 @@ def cheek(picture: np.ndarray, side: int) -> np.ndarray:
     return picture[80:90, x - 4 : x + 4, :3].mean(axis=(0, 1))
 
 
+@pytest.mark.parametrize("hurry", [False, True])
 @pytest.mark.parametrize("quality", ["full", "fast"])
-def test_skin_is_as_much_darker_as_the_texture_is_than_its_tone(gl: None, quality: str) -> None:
-    plain, half = drawn(None, quality=quality), drawn(encoded(SRGB, (10, 10, 200)), quality=quality)
+def test_skin_is_as_much_darker_as_the_texture_is_than_its_tone(gl: None, quality: str, hurry: bool) -> None:
+    plain = drawn(None, quality=quality, hurry=hurry)
+    half = drawn(encoded(SRGB, (10, 10, 200)), quality=quality, hurry=hurry)
     np.testing.assert_allclose(cheek(half, -1), cheek(plain, -1), atol=2.5, err_msg="where it has the skin's own tone")
     red, green, blue = cheek(half, 1)
     assert blue > 2 * red and blue > 2 * green and cheek(plain, 1)[0] > cheek(plain, 1)[2]
