@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -43,13 +43,17 @@ def head_texture(mesh: FitMesh, eyes: Eyes, parts: Sequence[SkinIslands]) -> tup
         return None, [f"textures not drawn: skin in {len(every)} pieces is too much for one of {MOST} pixels"]
     if not every:
         return None, []
-    picture, rectangles = _laid_out(every, tone)
+    what = " and ".join(["skin"] * bool(skin) + ["eyes"] * bool(fronts))
+    return joined(squares, tone), [f"{what} drawn with the mesh's own texture"]
+
+
+def joined(squares: Mapping[str, Sequence[Square]], tone: Floats) -> HeadTexture:
+    """The texture of squares by part. tone : (3,) linear RGB of a texel that leaves the skin as it is painted."""
+    picture, rectangles = _laid_out([square for own in squares.values() for square in own], tone)
     ends = np.cumsum([0, *map(len, squares.values())])
     tiles = {name: rectangles[a:b] for name, a, b in zip(squares, ends, ends[1:], strict=False)}
-    what = " and ".join(["skin"] * bool(skin) + ["eyes"] * (len(squares) > len(skin)))
     red, green, blue = np.asarray(tone, float).tolist()
-    data = encoded(np.rint(255.0 * srgb(picture)).astype(np.uint8))
-    return HeadTexture(data, (red, green, blue), tiles), [f"{what} drawn with the mesh's own texture"]
+    return HeadTexture(encoded(np.rint(255.0 * srgb(picture)).astype(np.uint8)), (red, green, blue), tiles)
 
 
 def _laid_out(squares: Sequence[Square], tone: Floats) -> tuple[Floats, Floats32]:

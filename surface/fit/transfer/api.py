@@ -16,6 +16,7 @@ from surface.check.overlaps import overlap_notes
 from surface.fit.eyes.drawn_lids import seat_drawn_lids
 from surface.fit.features.accessories import Kept, keep_accessories
 from surface.fit.measures.refusal import save_or_refuse
+from surface.fit.painting.scan import scan_texture
 from surface.fit.points.report import FitReport
 from surface.fit.source.load import LoadOptions
 from surface.fit.source.placing.frame import AXES, EYES_MM, UNITS
@@ -50,6 +51,7 @@ from surface.head.model.accessories import Accessory
 from surface.head.model.data import with_greatest_error
 from surface.head.model.file import check_writable
 from surface.head.model.placement import Placement
+from surface.head.model.texture import HeadTexture
 
 NONE_SEEN: Mapping[str, Floats] = MappingProxyType({})
 MANY = 250_000  # samples of the scan's head once it is found
@@ -67,7 +69,7 @@ class Transferred:
     frame in which the scan was registered.
 
     errors : by part, (m,) mm from each vertex of the skin at rest to the scan; NaN where the scan has nothing there.
-    accessories : meshes that it wears as they are.
+    accessories : meshes that it wears as they are. texture : of its skin; None without one.
     """
 
     head: HeadData
@@ -75,6 +77,7 @@ class Transferred:
     found: Similarity
     errors: dict[str, Floats] = field(default_factory=dict)
     accessories: tuple[Accessory, ...] = ()
+    texture: HeadTexture | None = None
 
 
 def transfer_head(
@@ -104,7 +107,8 @@ def transfer_head(
     if report_dir is not None:
         write_transfer_report(made.report, scan, made.head, made.found, report_dir)
     faults = made.report.fit.faults
-    save_or_refuse(out_dir, made.head, faults, made.errors, made.accessories, force=force, hint=HINT)
+    beside = made.errors, made.accessories, made.texture
+    save_or_refuse(out_dir, made.head, faults, *beside, force=force, hint=HINT)
     return made.report
 
 
@@ -133,9 +137,12 @@ def transfer(
     factor, notes = _true_size(found, options.unit, picked)
     notes += [*scan.notes, *mended]
     notes += ["the face is symmetric, and was fitted symmetrically"] if mirrored else []
+    texture = None
     if scan.colours is not None:
         data, colour_notes = with_colours(data, scan.colours, scan.eye_colours)
-        notes += colour_notes
+        if colour_notes:
+            data, texture = scan_texture(data, scan.colours)
+        notes += [*colour_notes, *["skin drawn with the scan's own colours"] * (texture is not None)]
     measured = face_errors(data, template, done.warp, shown)
     parts = measured.parts
     registered = registration_errors(template, done, matcher, STAGES[-1].farthest)
@@ -154,7 +161,7 @@ def transfer(
     notes += [str(gap) for gap in gaps]
     fit = FitReport(name, parts, moving, notes=notes, scale=1.0, faults=faults)
     report = TransferReport(fit, head.name, *registered, landmarks, openings, changed, gaps)
-    return Transferred(data, report, found, errors, worn.accessories)
+    return Transferred(data, report, found, errors, worn.accessories, texture)
 
 
 def _registered(

@@ -24,7 +24,7 @@ from surface.head.model.face import face_of
 from surface.head.posing.paint import BASE, layer_field
 from surface.readers.meshdata import MeshData
 
-MANY = 300_000  # samples of a scan's colours
+MANY, DETAILED = 300_000, 1_500_000  # samples of a scan's colours, of vertices and of textures
 PLAIN = 0.02  # standard deviation below which colours are one grey, or white, all over, and are not used
 NEAR_MM = 2.0  # greatest distance from a vertex of the head to the samples that give its colour
 FRONT = 0.3  # least z of the normals of the vertices whose median colour is that of the skin
@@ -49,7 +49,9 @@ def scan_colours(raw: MeshData, kept: Bools | None = None) -> Samples | None:
         raw.materials,
     )  # fmt: skip
     faces = np.arange(len(raw.faces)) if kept is None else np.flatnonzero(kept)
-    steps = int(np.clip(np.sqrt(2.0 * MANY / max(len(triangles(raw.faces[faces])), 1)) - 1.5, 0, 12))
+    textured = any(m is not None and m.texture is not None for m in raw.materials)
+    many, most = (DETAILED, 40) if textured else (MANY, 12)
+    steps = int(np.clip(np.sqrt(2.0 * many / max(len(triangles(raw.faces[faces])), 1)) - 1.5, 0, most))
     found = sample_colours(mesh, faces, steps=steps, tint=raw.colours)
     if found is None:
         return None

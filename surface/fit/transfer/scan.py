@@ -36,7 +36,8 @@ class Scan:
     """Triangles of a bare mesh, in any unit and axes.
 
     vertices : (n, 3). triangles : (t, 3). original : (m,) int64, for each vertex of the file its row in ``vertices``.
-    colours : samples of its colours; None where it has none. eye_colours : of those, the ones of pieces named as eyes.
+    colours : samples of its colours; None where it has none. eye_colours : those of pieces named as eyes, which are not
+        among ``colours``.
     notes : messages on what was left out of the file.
     worn : hair, hats and glasses that a head keeps as they are, in the file's coordinates; None without any.
     """
@@ -91,7 +92,8 @@ def read_scan(path: str | Path, without: tuple[str, ...] = ()) -> Scan:
         kept, notes = skin_and_eyes(raw, wanted & ~aside)
         scan = make_scan(raw.vertices, triangles(raw.faces[kept]), str(path))
         worn, damage = worn_mesh(still, aside, str(path))
-        colours, eyes = scan_colours(raw, kept), scan_colours(raw, eye_faces(raw, kept))
+        eye = eye_faces(raw, kept)
+        colours, eyes = scan_colours(raw, kept & ~eye), scan_colours(raw, eye)
         return replace(scan, colours=colours, eye_colours=eyes, notes=(*notes, *damage), worn=worn)
     if kind not in OTHERS:
         raise FitError(f"{path}: {kind or 'a file without suffix'} is no mesh that can be read",
