@@ -115,12 +115,16 @@ def level_at_rims(mesh: FitMesh, wanted: SlopeTargets) -> SlopeTargets:
 
 
 def point_normals(mesh: FitMesh) -> Floats:
-    """(n, 3) normals of a mesh at its vertices, those of the faces around weighted by their area; not of length 1."""
+    """(n, 3) normals of a mesh at its vertices, those of the triangles around weighted by their angles there, however
+    quads are split; not of length 1."""
     out = np.zeros_like(mesh.vertices)
     corner = triangles(mesh.faces)
-    a, b, c = (mesh.vertices[corner[:, k]] for k in range(3))
-    for k in range(3):
-        np.add.at(out, corner[:, k], np.cross(b - a, c - a))
+    points = mesh.vertices[corner]
+    sides = [_unit(np.roll(points, -k, axis=1)[:, j] - points[:, j]) for j in range(3) for k in (1, 2)]
+    normal = _unit(np.cross(sides[0], sides[1]))
+    for j in range(3):
+        angle = np.arccos(np.clip((sides[2 * j] * sides[2 * j + 1]).sum(axis=1), -1.0, 1.0))
+        np.add.at(out, corner[:, j], angle[:, None] * normal)
     return out
 
 
