@@ -31,7 +31,7 @@ def write_glb_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list
     _refuse_angles(pose)
     placement = placement_of(head)
     parts = in_file(_parts(head), placement, 1.0 / float(METRES))
-    _replace(path, Document(head, parts, pose, {"frame": "file"}).bytes())
+    _replace(path, Document(head, parts, pose, {"frame": "file", "placement": placement.table()}).bytes())
     return [path]
 
 

@@ -30,7 +30,7 @@ class Document(GlbBuffers):
     """
 
     def __init__(self, head: Head, parts: list[ExportPart], pose: Mapping[str, float],
-                 extras: Mapping[str, str] = MappingProxyType({})) -> None:  # fmt: skip
+                 extras: Mapping[str, Any] = MappingProxyType({})) -> None:  # fmt: skip
         super().__init__()
         self._materials: dict[str, dict[str, Any]] = {}
         self._images: list[dict[str, Any]] = []
@@ -145,7 +145,7 @@ class Document(GlbBuffers):
         )
 
 
-def asset(head: Head, extras: Mapping[str, str]) -> dict[str, Any]:
+def asset(head: Head, extras: Mapping[str, Any]) -> dict[str, Any]:
     provenance = {k: str(v) for k, v in head.data.provenance.items()}
     source = "; ".join(v for k, v in provenance.items() if k in ("source_name", "source_licence"))
     out: dict[str, Any] = {"version": "2.0", "generator": "omote", "extras": {**provenance, **extras}}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import tempfile
 from collections.abc import Mapping
@@ -33,7 +34,7 @@ def write_obj(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
 def write_obj_in_file(head: Head, path: Path, pose: Mapping[str, float]) -> list[Path]:
     """Do the same as :func:`write_obj`, but in the axes, origin and unit of the file that the head was fitted to."""
     placement = placement_of(head)
-    title = f"# {head.name}{_OWN} in the frame of its source"
+    title = f"# {head.name}{_OWN} in the frame of its source, {json.dumps({'placement': placement.table()})}"
     parts = _parts(head, pose)
     return _write_parts(in_file(parts, placement), path, title)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,6 +14,7 @@ from surface.export.textures import EYE_RIM, materials
 from surface.export.worn import accessory_parts
 from surface.head import Head
 from surface.head.posing.part import HeadPart
+from surface.mesh.strips import lower_strips, strip_uv
 
 MIN_MOVE_MM, MIN_NORMAL = 0.03, 0.012
 """Smaller moves of vertices, and smaller changes of their normals, are left out."""
@@ -106,7 +106,7 @@ def _add_material_data(part: ExportPart, own: HeadPart, kept: Ints, front: float
     if part.material == "eye":
         return WebPart(part, _rgba(np.ones(3), 1.0, len(kept)), _eye_uv(part) if shown is None else shown)
     if part.material in ("brow", "lash"):
-        strength = a("strength", 1.0) * (_lash_strength(part.vertices, own, kept) if part.material == "lash" else 1.0)
+        strength = a("strength", 1.0) * (_lash_strength(own, kept) if part.material == "lash" else 1.0)
         return WebPart(part, _rgba(a("albedo", plain), strength, len(kept)), _strip_uv(own, kept))
     if part.material in ("strand", "tress"):
         strands = a("strands", (0.0, 0.0, 1.0, 1.0))
@@ -163,15 +163,12 @@ def _eye_uv(part: ExportPart) -> Floats32:
 
 
 def _strip_uv(own: HeadPart, kept: Ints) -> Floats32:
-    """Return (m, 2): along a strip of hair and from its tips down; strips of one part lie two units of u apart."""
-    u, v = np.asarray(own.uv, np.float32)[kept].T
-    uv: Floats32 = np.clip(np.column_stack([u - 2.0 * np.floor(u / 2.0), 1.0 - v]), 0.0, 1.0).astype(np.float32)
+    """Return (m, 2): along a strip of hair and from its tips down."""
+    uv: Floats32 = strip_uv(own)[kept]
+    uv[:, 1] = 1.0 - uv[:, 1]
     return uv
 
 
-def _lash_strength(vertices: Floats32, own: HeadPart, kept: Ints) -> Floats:
+def _lash_strength(own: HeadPart, kept: Ints) -> Floats:
     """Return the strength (m, 1) of lashes; those of the lower lid are fainter."""
-    strip = np.floor(np.asarray(own.uv)[kept, 0] / 2.0)
-    heights: Mapping[float, float] = {s: float(vertices[strip == s, 1].mean()) for s in np.unique(strip)}
-    middle = float(np.mean(list(heights.values())))
-    return np.where([[heights[s] < middle] for s in strip], _LOWER_LASHES, 1.0)
+    return np.where(lower_strips(own)[kept][:, None], _LOWER_LASHES, 1.0)

@@ -57,7 +57,7 @@ def _from_the_back(mesh: FitMesh, faces: Ints, at: Floats) -> list[int]:
     those of drawn characters."""
     depth = at[mesh.faces[faces, :3], 2].mean(axis=1)
     pieces = np.unique(mesh.piece[faces])
-    front = {int(k): float(np.median(depth[mesh.piece[faces] == k])) for k in pieces}
+    front = {int(k): float(np.percentile(depth[mesh.piece[faces] == k], 90)) for k in pieces}
     return sorted(front, key=lambda k: (is_iris(mesh.pieces[k]), front[k]))
 
 

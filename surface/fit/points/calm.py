@@ -18,12 +18,13 @@ from surface.base.arrays import Bools, Floats
 from surface.fit.points.net import Net
 from surface.fit.points.solve import solve
 from surface.fit.source.chart import Chart, Slopes
-from surface.fit.source.mesh import FitMesh
+from surface.fit.source.mesh import FitMesh, triangles
 
 CALMER = 10.0  # factor by which fairness and bending weigh more where the surface is calm
 STEADIER = 2.0  # and slopes
 MIN_HOLD = 0.1  # least weight of a control point at a sample that it is held by
 CORNERS = 4  # of a face
+CREASE_RAD = np.radians(30.0)  # between a border's own faces and all around it: from there on the mesh has a crease
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,46 @@ class Calm:
         if slopes is None:
             raise ValueError("a chart without slopes")
         mixes = (slopes.mix_u, slopes.mix_v, slopes.turn_u, slopes.turn_v)
-        return SlopeTargets(slopes, *(samples_of(self.mesh, mix) for mix in mixes))
+        return level_at_rims(self.mesh, SlopeTargets(slopes, *(samples_of(self.mesh, mix) for mix in mixes)))
+
+
+def level_at_rims(mesh: FitMesh, wanted: SlopeTargets) -> SlopeTargets:
+    """The targets with which the surface at rest meets the rest of the mesh without a crease at the chart's border.
+
+    A chart knows only its own faces, so that at its border the last one's slope would go on: where the mesh is smooth,
+    the corner lies as the mean of all faces of the mesh around it. Creases of the mesh, as at lips, stay.
+    """
+    rim = np.flatnonzero(wanted.slopes.rim >= 0)
+    if not len(rim):
+        return wanted
+    face, vertex = rim // CORNERS, wanted.slopes.rim[rim]
+    own = [slope[face, :3] + turn[rim, :3] for slope, turn in ((wanted.u, wanted.turn_u), (wanted.v, wanted.turn_v))]
+    flat, whole = _unit(np.cross(own[0], own[1])), _unit(point_normals(mesh)[vertex])
+    whole *= np.sign((flat * whole).sum(axis=1))[:, None]
+    smooth = (flat * whole).sum(axis=1) > np.cos(CREASE_RAD)
+    turns = [wanted.turn_u.copy(), wanted.turn_v.copy()]
+    for turn, slope in zip(turns, own, strict=True):
+        turn[rim, :3] -= np.where(smooth, (slope * whole).sum(axis=1), 0.0)[:, None] * whole
+    return replace(wanted, turn_u=turns[0], turn_v=turns[1])
+
+
+def point_normals(mesh: FitMesh) -> Floats:
+    """(n, 3) normals of a mesh at its vertices, those of the triangles around weighted by their angles there, however
+    quads are split; not of length 1."""
+    out = np.zeros_like(mesh.vertices)
+    corner = triangles(mesh.faces)
+    points = mesh.vertices[corner]
+    sides = [_unit(np.roll(points, -k, axis=1)[:, j] - points[:, j]) for j in range(3) for k in (1, 2)]
+    normal = _unit(np.cross(sides[0], sides[1]))
+    for j in range(3):
+        angle = np.arccos(np.clip((sides[2 * j] * sides[2 * j + 1]).sum(axis=1), -1.0, 1.0))
+        np.add.at(out, corner[:, j], angle[:, None] * normal)
+    return out
+
+
+def _unit(rows: Floats) -> Floats:
+    unit: Floats = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-12)
+    return unit
 
 
 def samples_of(mesh: FitMesh, mix: csr_matrix) -> Floats:

@@ -239,6 +239,7 @@ class Slopes:
     weight : (f,) in least squares. corners : (f, 4, 2) of the faces in (u, v); the centre where there is no fourth.
     turn_u, turn_v : (4 f, n) sparse, a row for each corner: how the slope of a surface that is smooth across the mesh's
         edges turns from the face to there: the mean of the faces around less the face's own; 0 for a fourth of three.
+    rim : (4 f,) the mesh's vertex at corners on the border of the chart, -1 at others.
     """
 
     uv: Floats
@@ -249,6 +250,7 @@ class Slopes:
     corners: Floats = field(default_factory=lambda: np.zeros((0, 4, 2)))
     turn_u: csr_matrix = field(default_factory=lambda: csr_matrix((0, 0)))
     turn_v: csr_matrix = field(default_factory=lambda: csr_matrix((0, 0)))
+    rim: Ints = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
 def face_slopes(island: Island, vertices: int, weight: Floats, *, downweight_slivers: bool = False) -> Slopes:
@@ -276,7 +278,14 @@ def face_slopes(island: Island, vertices: int, weight: Floats, *, downweight_sli
     turn = _to_corners(island.faces, np.maximum(weight * area, 1e-9 * float((weight * area).max(initial=1e-9))))
     slope = (csr_matrix((gradient[..., i].ravel(), place), shape=shape) for i in (0, 1))
     turn_u, turn_v = ((diags(np.repeat(span[:, i], 4)) @ turn @ s).tocsr() for i, s in enumerate(slope))
-    return Slopes(centre, span, mix_u, mix_v, weight, centre[:, None] + offset, turn_u, turn_v)
+    return Slopes(centre, span, mix_u, mix_v, weight, centre[:, None] + offset, turn_u, turn_v, _rim(island))
+
+
+def _rim(island: Island) -> Ints:
+    """(4 f,) the mesh's vertex at corners of faces on a border of the island, -1 at others."""
+    border = np.zeros(len(island.uv) + 1, bool)
+    border[np.concatenate([np.zeros(0, np.int64), *boundary_loops(island)])] = True
+    return np.where(border[island.faces], island.vertex[island.faces], -1).ravel()
 
 
 def _to_corners(faces: Ints, share: Floats) -> csr_matrix:
@@ -297,6 +306,6 @@ def join_slopes(parts: list[Slopes]) -> Slopes:
     """The slopes of several islands as one."""
     sparse = ("mix_u", "mix_v", "turn_u", "turn_v")
     mix_u, mix_v, turn_u, turn_v = (vstack([getattr(p, k) for p in parts]).tocsr() for k in sparse)
-    keys = ("uv", "span", "weight", "corners")
-    uv, span, weight, corner = (np.concatenate([getattr(p, k) for p in parts]) for k in keys)
-    return Slopes(uv, span, mix_u, mix_v, weight, corner, turn_u, turn_v)
+    keys = ("uv", "span", "weight", "corners", "rim")
+    uv, span, weight, corner, rim = (np.concatenate([getattr(p, k) for p in parts]) for k in keys)
+    return Slopes(uv, span, mix_u, mix_v, weight, corner, turn_u, turn_v, rim)

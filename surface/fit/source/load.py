@@ -18,6 +18,7 @@ from surface.fit.source.naming.namenotes import name_notes
 from surface.fit.source.naming.shapes import empty_shapes, share_of
 from surface.fit.source.placing.anatomy import Eyes, Landmarks
 from surface.fit.source.placing.conventions import convention_of, is_export
+from surface.fit.source.placing.exported import exported_placement
 from surface.fit.source.placing.frame import Frame, find_frame
 from surface.fit.source.placing.orient import shapes_of_sides
 from surface.fit.source.textures import tinted
@@ -54,6 +55,7 @@ class Loaded:
 
     placement : from the file's coordinates; marks : landmarks in head space.
     pieces : the file's objects and what kind each is. exported : omote wrote the file, with outlines as they are drawn.
+    home : (3,) shift, mm, by which a head that omote exported comes to where it lay; None for other files.
     worn : hair, glasses and the like that a head keeps as they are, in the file's coordinates; None without any.
     """
 
@@ -65,6 +67,7 @@ class Loaded:
     pieces: dict[str, str] = field(default_factory=dict)
     exported: bool = False
     worn: FitMesh | None = None
+    home: Floats | None = None
 
 
 def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
@@ -87,13 +90,15 @@ def load_mesh(path: str | Path, options: LoadOptions = LoadOptions()) -> Loaded:
     check_mesh(mesh, str(path))
     own = read_names(options.names) if options.names else None
     named = map_names(mesh.names, own, empty=empty_shapes(mesh), other=other, share=partial(share_of, mesh))
+    known = None if options.unit or options.up or options.forward else exported_placement(path)
     frame = find_frame(
         mesh.vertices, _shapes(mesh, named), unit=options.unit, up=options.up, forward=options.forward,
-        faces=mesh.faces, convention=convention_of(path),
+        faces=mesh.faces, convention=convention_of(path), known=known,
     )  # fmt: skip
     mesh = replace(mesh, vertices=frame.points(mesh.vertices), deltas=frame.points(mesh.deltas))
     every = (*frame.notes, *notes, *damage, *name_notes(mesh.names, named, other))
-    return Loaded(mesh, named, every, frame.placement, _turned(frame), pieces, is_export(path), worn)
+    home = None if known is None else known.shift
+    return Loaded(mesh, named, every, frame.placement, _turned(frame), pieces, is_export(path), worn, home)
 
 
 def fit_mesh_of(raw: MeshData) -> FitMesh:

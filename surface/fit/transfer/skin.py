@@ -13,14 +13,18 @@ from scipy.spatial import cKDTree
 from surface.base.arrays import Bools, Floats, Ints
 from surface.dcp import DCPSurface
 from surface.fit.features.rigging import lid_share
+from surface.fit.transfer.detail.below_neck import neck_share
 from surface.fit.transfer.detail.cover import Sheet, cover
 from surface.fit.transfer.detail.finer_mesh import finer_mesh
 from surface.fit.transfer.detail.finer_points import fit_points
+from surface.fit.transfer.detail.rounded import looseness, weights
 from surface.fit.transfer.detail.uncross import uncrossed
+from surface.fit.transfer.place_parts import fit_scale_shift
 from surface.fit.transfer.register import Matcher
 from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.warp import Warp
 from surface.head import Contact, Head, HeadPart, Jaw, PartData
+from surface.head.model.data import Neck
 from surface.head.model.parameters import smoothstep
 
 DETAIL_MM, PASSES = 5.0, 3  # greatest distance of the scan's detail that one pass follows; number of passes
@@ -67,6 +71,7 @@ class Skin:
         self._seen = smoothstep(distance, *RIM_MM) * (1.0 - lids)
         self._free = (distance > FREE_MM) & (lids == 0.0)
         self._weight = np.ones(n)  # in least squares
+        self._on = np.zeros(n, bool)  # the scan
         self._steps = _steps(self.mesh.triangles, n)
         self._matrix = (self._steps.T @ self._steps).tocsr()
 
@@ -89,7 +94,21 @@ class Skin:
                 if not (more := self._folded(at, mapped) & ~folds).any():
                     break
                 folds |= more
-            self.at = at
+            self.at, self._on = at, match.found
+
+    def round_off(self, samples: Samples, neck: Neck, scale: float) -> None:
+        """Make the skin round about where it leaves the scan for good, but not on the front of the face, at
+        openings or on the neck.
+
+        There it bends as on the head that it comes from. samples : of the scan's front. neck : of that head. scale : as
+        for :meth:`follow`.
+        """
+        able = (1.0 - neck_share(self.rest, neck)) * self._free
+        loose = looseness(self.at, self._on, able, samples.points, scale)
+        if loose.any():
+            base = fit_scale_shift(self.rest[self._on], self.at[self._on]).points(self.rest)
+            weight, off = weights(loose)[:, None], self.at - base
+            self.at = base + _solved((diags(weight[:, 0]) + SMOOTH * self._matrix).tocsc(), weight * off)
 
     def cover(self, matcher: Matcher, samples: Samples, scale: float) -> None:
         """Move the skin to those samples of the scan that none of it is near, such as pits and closed nostrils, outside

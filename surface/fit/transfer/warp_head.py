@@ -104,6 +104,7 @@ def _skins(
         if part.follows == "skin" and part.material == "skin" and part.name != SOCKETS:
             skin = Skin(part, rims, warp, old, LONGEST_MM * scale)
             skin.follow(matcher, scale)
+            skin.round_off(front, head.data.neck, scale)
             if part.name == lips.part:
                 skin.cover(matcher, front, scale)
             out[part.name] = skin

@@ -341,7 +341,7 @@ def _table(head: HeadData) -> dict[str, Any]:
         "contacts": [_contact_table(c) for c in head.contacts],
         "rules": [vars(r) for r in head.rules],
         "paint": head.paint,
-        **({"placement": _placement_table(head.placement)} if head.placement else {}),
+        **({"placement": head.placement.table()} if head.placement else {}),
     }  # fmt: skip
 
 
@@ -357,8 +357,3 @@ def _extent_table(part: PartData) -> dict[str, Any]:
     ends = {key: getattr(part, key) for key in ("closed_u", "closed_v", "rect")}
     table: dict[str, Any] = {key: [float(x) for x in row] for key, row in ends.items() if row is not None}
     return table | ({"flip": True} if part.flip else {})
-
-
-def _placement_table(placement: Placement) -> dict[str, Any]:
-    turn, shift = (np.round(rows, 9).tolist() for rows in (placement.turn, placement.shift))
-    return {"turn": turn, "scale": placement.scale, "shift": shift, "unit": placement.unit}

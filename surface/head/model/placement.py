@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -46,3 +47,8 @@ class Placement:
     def moved(self, shift: Floats) -> Placement:
         """Return this placement followed by a shift (3,), mm."""
         return Placement(self.turn, self.scale, self.shift + shift, self.unit)
+
+    def table(self) -> dict[str, Any]:
+        """Return the same in plain numbers and words, as head.toml and exported files keep it."""
+        turn, shift = (np.round(rows, 9).tolist() for rows in (self.turn, self.shift))
+        return {"turn": turn, "scale": self.scale, "shift": shift, "unit": self.unit}

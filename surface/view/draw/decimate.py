@@ -14,7 +14,8 @@ from surface.head import Head, load_data
 from surface.head.posing.baked import write_decimated
 from surface.head.posing.part import HeadPart
 from surface.mesh.collapse import Collapse
-from surface.view.draw.materials import attribute, material_of, strip_uv
+from surface.mesh.strips import strip_uv
+from surface.view.draw.materials import attribute, material_of
 
 #: Greatest root mean square error of triangles of quality "fast", mm, by material; and the share of it that each
 #: quality may have.

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from surface.base.arrays import median
+from surface.mesh.strips import lower_strips, strip_uv
 from surface.view.draw.programs import build
 from surface.view.draw.tooth_necks import tooth_necks
 from surface.view.scene.openings import LID_POINTS, Openings
@@ -308,24 +309,13 @@ def _painted(part: ViewPart, theme: Theme, colour: str) -> tuple[float, ...]:
     return getattr(theme, colour) if own is None or not theme.use_painted else tuple(own[0].tolist())
 
 
-def strip_uv(part: ViewPart) -> np.ndarray:
-    """Coordinates along and across a strip of hair, 0..1 (m, 2): strips of one part lie two units of u apart."""
-    uv = np.array(part.uv, np.float32)
-    uv[:, 0] -= 2.0 * np.floor(uv[:, 0] / 2.0)
-    return np.clip(uv, 0.0, 1.0)
-
-
 def strip_strength(part: ViewPart, theme: Theme) -> np.ndarray:
     """Opacity of each hair, (m, 1): lashes of the lower lid are fainter."""
     share = 1.0 if theme.lit and part.material == "brow" else theme.hair
     strength = share * (attribute(part, "strength", (1.0,))[:, :1] if theme.use_painted else np.ones((len(part.uv), 1)))
     strength = strength.astype(np.float32)
     if part.material == "lash":
-        strip = np.floor(np.asarray(part.uv)[:, 0] / 2.0)
-        height = {s: float(part.vertices[strip == s, 1].mean()) for s in np.unique(strip)}
-        middle = float(np.mean(list(height.values())))
-        lower = np.array([height[s] < middle for s in strip])
-        strength[lower] *= _LOWER_LASHES
+        strength[lower_strips(part)] *= _LOWER_LASHES
     return strength
 
 

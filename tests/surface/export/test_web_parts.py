@@ -27,7 +27,8 @@ def export_part(vertices: Any, material: str = "skin", **other: Any) -> ExportPa
 
 def own_part(count: int, uv: Any = None, **attributes: Any) -> Any:
     """What web_parts reads of a head's part."""
-    return SimpleNamespace(uv=np.zeros((count, 2)) if uv is None else np.asarray(uv), attributes=attributes)
+    places = np.zeros((count, 2)) if uv is None else np.asarray(uv)
+    return SimpleNamespace(uv=places, attributes=attributes, material="brow")
 
 
 def test_only_vertices_of_triangles_are_kept_and_only_shapes_that_move_them() -> None:
@@ -88,9 +89,10 @@ def test_strips_of_hair_lie_two_units_apart_and_have_their_tips_at_the_top() -> 
 
 
 def test_lashes_of_the_lower_lid_are_fainter() -> None:
-    uv = np.array([[0.0, 3.9], [0.9, 0.1], [2.0, 0.2], [2.7, 3.5], [9.0, 9.0]])
-    vertices = np.float32([[0, 9, 0], [0, 11, 0], [0, 5, 0], [0, 6, 0]])
-    found = module._lash_strength(vertices, own_part(5, uv), np.arange(4))
+    uv = np.array([[0.0, 3.9], [0.9, 0.1], [2.0, 0.2], [2.7, 3.5], [4.0, 0.0]])
+    vertices = np.float32([[0, 9, 0], [0, 11, 0], [0, 5, 0], [0, 6, 0], [0, 10, 0]])
+    own = SimpleNamespace(**vars(own_part(5, uv)), vertices=vertices)
+    found = module._lash_strength(own, np.arange(4))
     assert found.tolist() == [[1.0], [1.0], [0.42], [0.42]]
 
 
@@ -140,6 +142,7 @@ def test_brows_are_as_strong_as_they_are_painted_and_lashes_by_their_lid() -> No
     uv = np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]])
     own = own_part(3, uv, strength=np.array([0.5, 1.0, 0.5]), albedo=np.array([[0.1, 0.2, 0.3]] * 3))
     vertices = [[0, 9, 0], [0, 9, 0], [0, 2, 0.0]]
+    own.vertices = np.array(vertices)
     brow = module._add_material_data(export_part(vertices, "brow"), own, np.arange(3), 0.0)
     np.testing.assert_allclose(brow.colours, [[0.1, 0.2, 0.3, a] for a in (0.5, 1.0, 0.5)], atol=1e-6)
     lash = module._add_material_data(export_part(vertices, "lash"), own, np.arange(3), 0.0)

@@ -33,7 +33,7 @@ def convention_of(path: Path) -> Convention:
     kind = path.suffix.lower()
     if kind in (".glb", ".gltf", ".vrm"):
         return _gltf(path)
-    if kind == ".obj" and path.is_file() and OMOTE_OBJ in _first_line(path):
+    if kind == ".obj" and path.is_file() and OMOTE_OBJ in first_line(path):
         return OBJ
     return Convention()
 
@@ -43,7 +43,7 @@ def is_export(path: Path) -> bool:
     kind = path.suffix.lower()
     if kind in (".glb", ".gltf"):
         return _is_own(Gltf(path).document.get("asset"))
-    return kind == ".obj" and path.is_file() and WRITTEN in _first_line(path)
+    return kind == ".obj" and path.is_file() and WRITTEN in first_line(path)
 
 
 def _is_own(asset: Any) -> bool:
@@ -62,5 +62,6 @@ def _gltf(path: Path) -> Convention:
     return GLTF
 
 
-def _first_line(path: Path) -> str:
+def first_line(path: Path) -> str:
+    """Return the first line of a file of text."""
     return read_bytes(path).partition(b"\n")[0].decode("utf-8", "replace")

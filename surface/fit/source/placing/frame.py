@@ -51,12 +51,14 @@ class Frame:
 def find_frame(
     vertices: Floats, shapes: dict[str, Floats], *, unit: str | None = None, up: str | None = None,
     forward: str | None = None, faces: Ints | None = None, convention: Convention = Convention(),
+    known: Placement | None = None,
 ) -> Frame:  # fmt: skip
     """Find axes and unit: as given, else as the format defines where the head's anatomy does not contradict it, else
     by eyes, mouth and size of the head.
 
     shapes : displacements (n, 3) by ARKit's names; see :func:`surface.fit.source.placing.anatomy.find_landmarks`.
     unit : one of :data:`UNITS`; up, forward : x, y, z, -x, -y or -z. convention : what the format defines.
+    known : how the file lies, where it says so itself; unit, up and forward go before it.
 
     Raises FitError: an unknown word, or up and forward along one axis.
     """
@@ -66,6 +68,8 @@ def find_frame(
     marks = find_landmarks(vertices, np.zeros((0, 4), np.int64) if faces is None else faces, shapes)
     if faces is not None and orient(vertices, marks) is None:
         marks = _by_form(vertices, faces, marks, notes)
+    if known is not None and not (unit or up or forward):
+        return Frame(known.turn, known.scale, tuple(notes), known.unit, marks)
     turn = _turn(vertices, shapes, marks, up, forward, convention, notes)
     height = float(np.ptp(vertices @ turn[1]))
     scale, name = _scale(marks.eyes, height, unit, convention, notes)

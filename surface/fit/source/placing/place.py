@@ -21,6 +21,7 @@ PIVOT, SLOPE, STILL, WHOLE = np.array([0.0, -91.1, -89.2]), 0.35, -217.6, -143.6
 NECK_AT = -155.0  # height of the neck below the eyes, mm, on that head
 NECK_WIDE = 70.0  # further out than that from the middle nothing is neck
 LIPS_BELOW = 72.0  # height of the eyes above the lips, mm, on that head
+STAYS = 1.0  # in distances of the eyes: further from its place than that an exported head is moved, as any other
 CLOSE_MM = 0.05  # a head that stands as near to its place stays where it is
 
 
@@ -35,6 +36,9 @@ class HeadSize:
 def place(loaded: Loaded) -> Loaded:
     """The mesh with its head in its place and without a body; unchanged where no eyes were found.
 
+    A head that omote exported stays where it lay: its eyeballs are others than those of its mesh, such as flat eyes
+    that fill their openings.
+
     loaded : in mm and head axes, as :func:`surface.fit.source.load.load_mesh` returns it.
     """
     eyes = loaded.marks.eyes
@@ -42,6 +46,8 @@ def place(loaded: Loaded) -> Loaded:
         return loaded
     size = head_size(loaded.marks)
     shift = EYES_AT - eye_middle(eyes, size)
+    if loaded.home is not None and np.linalg.norm(shift - loaded.home) < STAYS * eyes.apart:
+        shift = loaded.home
     if np.abs(shift).max() > CLOSE_MM:
         loaded = moved(loaded, shift)
     mesh, notes = cut_bust(loaded.mesh, EYES_AT, max(size.across, size.along))

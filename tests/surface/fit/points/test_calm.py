@@ -4,7 +4,16 @@ import numpy as np
 import pytest
 from slit_sheet import N, slit_sheet
 
-from surface.fit.points.calm import MIN_HOLD, STEADIER, SlopeTargets, beside, calm_faces, calm_points, samples_of
+from surface.fit.points.calm import (
+    MIN_HOLD,
+    STEADIER,
+    SlopeTargets,
+    beside,
+    calm_faces,
+    calm_points,
+    level_at_rims,
+    samples_of,
+)
 from surface.fit.points.net import coarse_places, net_at
 from surface.fit.points.solve import basis
 from surface.fit.source.chart import Chart, make_chart
@@ -91,3 +100,40 @@ def test_samples_of_a_mesh_are_neutral_and_then_each_shape(sheet):
     for k, field in enumerate((mesh.vertices, *mesh.deltas)):
         np.testing.assert_array_equal(rows[:, 3 * k : 3 * k + 3], chart.mix @ field)
     assert len(chart.uv) > N**2
+
+
+def tube(sides: int) -> FitMesh:
+    """A tube of flat sides, upright, whose two halves are islands of their own in (u, v) and share their borders."""
+    angle = 2.0 * np.pi * np.arange(sides) / sides
+    ring = np.column_stack([10 * np.cos(angle), 0 * angle, 10 * np.sin(angle)])
+    vertices = np.concatenate([ring + np.array([0, y, 0]) for y in (0.0, 5.0, 10.0)])
+    k, row = (x.ravel() for x in np.meshgrid(np.arange(sides), np.arange(2)))
+    faces = np.column_stack([row * sides + k, (row + 1) * sides + k, (row + 1) * sides + (k + 1) % sides,
+                             row * sides + (k + 1) % sides])  # fmt: skip
+    half = sides // 2
+    u = np.column_stack([k, k, k + 1, k + 1]) / half * 0.4 + np.where(k >= half, 0.1, 0.0)[:, None]
+    v = 0.2 * np.column_stack([row, row + 1, row + 1, row])
+    uv = np.column_stack([u.ravel(), v.ravel()])
+    uv, place = np.unique(uv.round(9), axis=0, return_inverse=True)
+    none = np.zeros((0, len(vertices), 3))
+    return FitMesh(vertices, faces.astype(np.int64), uv, place.reshape(-1, 4).astype(np.int64), (), none)
+
+
+@pytest.mark.parametrize(("sides", "smooth"), [(8, True), (4, False)])
+def test_borders_lie_as_the_whole_mesh_does_unless_it_has_a_crease_there(sides, smooth):
+    mesh = tube(sides)
+    chart = make_chart(mesh, find_islands(mesh))
+    s = chart.slopes
+    before = SlopeTargets(s, *(samples_of(mesh, m) for m in (s.mix_u, s.mix_v, s.turn_u, s.turn_v)))
+    after = level_at_rims(mesh, before)
+    upright = np.isin(s.rim % sides, [0, sides // 2]) & (s.rim >= 0)
+    assert upright.sum() == 16
+    face = np.flatnonzero(upright) // 4
+    for wanted, level in ((before, False), (after, smooth)):
+        u, v = wanted.u[face] + wanted.turn_u[upright], wanted.v[face] + wanted.turn_v[upright]
+        normal = np.cross(u, v)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        outwards = mesh.vertices[s.rim[upright]] * [0.1, 0.0, 0.1]
+        assert np.allclose(np.abs((normal * outwards).sum(axis=1)), 1.0, atol=1e-9) == level
+    inside = s.rim < 0
+    np.testing.assert_array_equal(after.turn_u[inside], before.turn_u[inside])

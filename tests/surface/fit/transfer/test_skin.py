@@ -13,6 +13,7 @@ from surface.fit.transfer.register import Matcher, Matches
 from surface.fit.transfer.scan import Samples
 from surface.fit.transfer.skin import Ball, Skin, follow_skin, rims_of, seat_on_eyeballs
 from surface.head import Contact, Head
+from surface.head.model.data import Neck
 
 OLD = Ball(np.array([[30.0, 0, 0], [-30.0, 0, 0]]), 12.0)
 RIM = np.array([[1e3, 0.0, 0.0]])
@@ -293,3 +294,55 @@ def test_skin_that_detail_would_fold_stays_where_the_map_has_it(mended, monkeypa
     made.follow(Lifted(made.rest, height, np.ones(len(rough), bool)), 1.0)
     assert ((made._facing(made.at) * flat).sum(axis=1).min() > 0.0) == mended
     np.testing.assert_allclose(made.at[part.vertices[:, 0] > 22, 2], 2.0, atol=0.2)
+
+
+NO_NECK = Neck((0.0, -900.0, 0.0), 0.0, -990.0, -950.0)
+
+
+def roof(lost_mm: float) -> tuple[Skin, np.ndarray]:
+    """Skin that follows a scan up a slope and, from its ridge on, lies level without a scan; and how far beyond it."""
+    part = grid(61)
+    part.vertices = np.column_stack([240 * part.mesh.uv, 0 * part.mesh.uv[:, 0]])
+    made = Skin(part, np.zeros((0, 3)), lambda p: p, FAR)
+    beyond = made.rest[:, 0] - 140.0
+    made.at = made.rest + np.column_stack([0 * beyond, 0 * beyond, 0.8 * np.minimum(beyond, 0.0)])
+    made._on = (beyond < 0.0) | (beyond > lost_mm)
+    return made, beyond
+
+
+def bend(made: Skin) -> float:
+    """The greatest second difference of heights along the middle of a roof."""
+    return float(np.abs(np.diff(made.at[:, 2].reshape(61, 61)[:, 30], 2)).max())
+
+
+def front_at(x: float) -> Samples:
+    """One sample of the front of a face, at the middle of a roof's height."""
+    return Samples(np.array([[x, 120.0, 0.0]]), np.array([[0.0, 0.0, 1.0]]), np.zeros(1, bool))
+
+
+def test_skin_is_round_where_it_leaves_the_scan_for_good() -> None:
+    made, beyond = roof(999.0)
+    before, corner = made.at.copy(), bend(made)
+    made.round_off(front_at(-900.0), NO_NECK, 1.0)
+    assert bend(made) < 0.35 * corner
+    np.testing.assert_allclose(made.at[beyond < -80.0], before[beyond < -80.0], atol=0.01)
+
+
+@pytest.mark.parametrize(("lost_mm", "front", "neck"), [
+    (20.0, front_at(-900.0), NO_NECK),  # a hole, however sharp
+    (999.0, Samples(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros(0, bool)), Neck((0.0, 0.0, 0.0), 0.0, 900.0, 950.0)),
+])  # fmt: skip
+def test_holes_and_necks_do_not_become_round(lost_mm, front, neck) -> None:
+    made, _ = roof(lost_mm)
+    before = made.at.copy()
+    made.round_off(front, neck, 1.0)
+    np.testing.assert_array_equal(made.at, before)
+
+
+def test_the_front_of_a_face_stays_on_the_scan() -> None:
+    made, _ = roof(999.0)
+    before = made.at.copy()
+    near = np.linalg.norm(made.rest - [120.0, 120.0, 0.0], axis=1) < 12.0
+    made.round_off(front_at(120.0), NO_NECK, 1.0)
+    moved = np.linalg.norm(made.at - before, axis=1)
+    assert moved.max() > 1.0 and moved[near].max() < 0.2

@@ -11,9 +11,9 @@ from small_head import small_head
 
 from surface.head import Head
 from surface.head.posing.part import border_edges
+from surface.mesh.strips import strip_uv
 from surface.view import Camera, Offscreen
 from surface.view.draw.decimate import decimated_triangles, grouped_in_patches
-from surface.view.draw.materials import strip_uv
 
 SHAPES: tuple[dict[str, float], ...] = (
     {"jawOpen": 1.0, "mouthUpperUpLeft": 1.0},

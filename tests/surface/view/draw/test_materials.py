@@ -15,7 +15,6 @@ from surface.view.draw.materials import (
     material_of,
     programs,
     skin_program,
-    strip_uv,
     uniforms_key,
 )
 from surface.view.pictures.offscreen import open_context
@@ -60,12 +59,6 @@ def test_detail_is_even_in_millimetres_and_closes_behind_the_head() -> None:
     assert scale.max() / scale.min() < 1.3
     back = uv[part.rest[:, 2] < -0.9 * part.rest[:, 2].max()]
     assert np.ptp(back[:, 0]) == pytest.approx(round(np.ptp(back[:, 0])), abs=1e-6)
-
-
-def test_strips_of_hair_are_told_apart_by_their_tiles() -> None:
-    part = skin()
-    part.uv[:4] = [(0.0, 0.2), (1.0, 0.5), (2.25, 1.0), (7.0, 0.0)]
-    assert strip_uv(part)[:4] == pytest.approx(np.array([(0.0, 0.2), (1.0, 0.5), (0.25, 1.0), (1.0, 0.0)]))
 
 
 def openings() -> Openings:
