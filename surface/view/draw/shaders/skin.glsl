@@ -2,6 +2,7 @@
 #define WIDE_SHARPNESS 11.0     // the narrow lobe is the wide one to the fourth power
 #define WIDE 0.150              // of the gloss, as NARROW
 #define NARROW 0.27
+#define SATIN 0.30              // of sky and fill light, what skin mirrors that is so dark that hardly any spreads under it
 
 uniform vec3 wrap;
 uniform vec3 through;           // colour of light that comes through thin skin
@@ -38,8 +39,16 @@ vec3 diffuse(vec3 n, vec3 v, vec3 albedo, float occlusion, float sun, float back
     light += ambient(n) * open;
     vec3 glow = key_colour * clamp(0.10 - dot(n, key_direction), 0.0, 1.0) + rim_colour * clamp(0.10 - rim, 0.0, 1.0);
     light += thin * occlusion * occlusion * through * glow;
+    // The surface itself mirrors, softly, what comes from above and from before: where melanin takes the light that
+    // spreads below it, that shows cheekbone, brow and temple.
+    vec3 between = normalize(v + key_direction + 0.5 * fill_direction + vec3(0.0, 0.4, 0.0));
+    float mirrored = max(dot(n, between), 0.0);
+    mirrored *= mirrored;
+    mirrored *= mirrored;
+    mirrored *= mirrored;
+    vec3 satin = SATIN * (1.0 - glowing) * occlusion * mirrored * mirrored * (sky + fill_colour);
     vec3 sheen = 0.16 * ambient(n) + 0.12 * rim_colour * back * clamp(rim + 0.4, 0.0, 1.0);
-    return albedo * light * mix(vec3(1.0), open, 0.35) + grazing(n, v) * occlusion * sheen;
+    return albedo * light * mix(vec3(1.0), open, 0.35) + grazing(n, v) * occlusion * sheen + satin;
 }
 
 // Scale of the key light's highlights: none in the shade, more at grazing angles.
