@@ -45,8 +45,8 @@ _ROLLED = np.array(
     ]
 )
 #: Of a folded collar: places round it, and how much closer together they are in front; by the angle from the front, how
-#: far it hangs from its rim, mm, most at its two points and hardly where its edges meet, and how far it stands out: where
-#: they meet it lies against the neck, rounded, or it would jut out as a board.
+#: far it hangs from its rim, mm, most at its two points and hardly where its edges meet, and how far it stands out,
+#: least where they meet, or it would jut out there as a board.
 _FOLDED, _DENSE = 64, 0.35
 _FALL = (0.0, 0.40, 0.52, 1.0, np.pi), (3.0, 54.0, 50.0, 31.0, 24.0)
 _OUT = (0.0, 0.15, 0.40, 1.0, np.pi), (1.0, 2.2, 7.0, 9.5, 9.0)
