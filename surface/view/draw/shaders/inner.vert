@@ -8,7 +8,7 @@
 #define CREVICE vec3(0.34, 0.19, 0.15)  // of the light, what is left between two teeth and at the gum
 #define OPEN_SHARE 0.55                 // of the sky that a tooth sees, from which on it is in the open
 
-#define CORNER vec3(0.68, 0.60, 0.57)   // of the light, what lips and cheek leave to teeth at the corners of the mouth
+#define CORNER vec3(0.54, 0.46, 0.43)   // of the light, what lips and cheek leave to teeth at the corners of the mouth
 #define CORNER_AT vec2(0.45, 1.0)       // of the way there: where they begin to shade them, and where they do
 #define BEHIND vec3(0.56, 0.50, 0.49)    // of the light, what the tongue leaves to the inner sides of teeth far back
 #define TONGUE_WET 0.35                  // nothing but a tongue is as wet
@@ -77,7 +77,7 @@ void main() {
     arrives *= mix(vec3(1.0), mix(CREVICE, vec3(1.0), smoothstep(0.0, OPEN_SHARE, occlusion)), teeth * (1.0 - 0.7 * behind));
     arrives *= mix(vec3(1.0), BEHIND, behind);
     float sideways = (1.0 - deep) * abs(dot(away, side)) / length(opening_side);
-    arrives *= mix(vec3(1.0), CORNER, teeth * (1.0 - inwards) * smoothstep(CORNER_AT.x, CORNER_AT.y, sideways));
+    arrives *= mix(vec3(1.0), CORNER, teeth * smoothstep(CORNER_AT.x, CORNER_AT.y, sideways));
     float nh = dot(n, normalize(key_direction + v));
     float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach * (1.0 - behind);  // else far teeth glitter
     v_colour = encode(own * tint * light * arrives + shine * key_colour);

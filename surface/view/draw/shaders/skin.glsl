@@ -2,7 +2,7 @@
 #define WIDE_SHARPNESS 11.0     // the narrow lobe is the wide one to the fourth power
 #define WIDE 0.150              // of the gloss, as NARROW
 #define NARROW 0.27
-#define SATIN 1.5               // of the gloss, for sky and fill light, in skin so dark that hardly any spreads under it
+#define SATIN 1.25              // of the gloss, for sky and fill light, in skin so dark that hardly any spreads under it
 #define SATIN_MOST 0.24         // of the gloss, that counts: lips have theirs
 
 uniform vec3 wrap;
