@@ -45,10 +45,11 @@ _ROLLED = np.array(
     ]
 )
 #: Of a folded collar: places round it, and how much closer together they are in front; by the angle from the front, how
-#: far it hangs from its rim, mm, most at its two points and not at all where its edges meet, and how far it stands out.
+#: far it hangs from its rim, mm, most at its two points and hardly where its edges meet, and how far it stands out,
+#: least where they meet, or it would jut out there as a board.
 _FOLDED, _DENSE = 64, 0.35
-_FALL = (0.0, 0.40, 0.52, 1.0, np.pi), (-6.0, 56.0, 50.0, 31.0, 24.0)
-_OUT = (0.0, 0.40, 1.0, np.pi), (7.0, 11.0, 10.0, 9.0)
+_FALL = (0.0, 0.40, 0.52, 1.0, np.pi), (3.0, 54.0, 50.0, 31.0, 24.0)
+_OUT = (0.0, 0.15, 0.40, 1.0, np.pi), (1.0, 2.2, 7.0, 9.5, 9.0)
 
 
 @dataclass(frozen=True)
@@ -199,7 +200,7 @@ def _folded(skin: Skin, ring: Floats, angle: Floats) -> list[Floats]:
     fall = np.interp(away, *_FALL)[:, None]
     out = np.interp(away, *_OUT)[:, None]
     down = np.array([0.0, -1.0, 0.0])
-    rows = [rim + 0.3 * down, rim + 2.2 * level + 0.4 * down, rim + 5.5 * level + 0.35 * fall * down]
+    rows = [rim + 0.3 * down, rim + 0.22 * out * level + 0.4 * down, rim + 0.55 * out * level + 0.35 * fall * down]
     rows += [rim + out * level + 0.75 * fall * down, rim + (out + 1.5) * level + fall * down]
     return [rows[0], rows[1], *(_clear(skin, _smooth(row, 1), 5.5) for row in rows[2:])]
 

@@ -37,7 +37,7 @@ def afro(skin: Skin) -> Style:
         within = np.clip((line.inside(at) - _FLAT_MM) / _ROUND_MM, 0.0, 1.0)
         return np.asarray(0.8 + full * within * (2.0 - within))  # rises at once, at half a right angle: no brim
 
-    layers = (1.0, 0.42), (0.94, 0.60), (0.86, 1.4)
+    layers = (1.0, 0.42), (0.92, 0.72), (0.66, 1.4)
     return Style(_shells(skin, line, thickness, layers, short_mm=0.5, fade=0.95, dense=0.45), line)
 
 

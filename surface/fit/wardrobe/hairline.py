@@ -18,6 +18,9 @@ POINTS = np.array(
     ],
     float,
 )  # fmt: skip
+#: The same where hair hangs down over the temple: in one slant, seen from the side, without a corner between forehead
+#: and temple.
+SLANTED = np.vstack([POINTS[:2], [(38, 105, 76), (50, 92, 70), (59, 77, 62), (66, 62, 53)], POINTS[6:]]).astype(float)
 #: The same where hair has receded: high corners at the temples beside what is left in the middle.
 RECEDED = np.vstack(
     [[(0, 122, 76), (14, 124, 71), (28, 129, 50), (42, 124, 38), (54, 108, 40), (63, 86, 45), (68, 64, 47)], POINTS[6:]]

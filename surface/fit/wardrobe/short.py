@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.wardrobe.hairline import POINTS, RECEDED, Hairline
+from surface.fit.wardrobe.hairline import POINTS, RECEDED, SLANTED, Hairline
 from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheets, tips
 from surface.fit.wardrobe.skin import CENTRE, Skin, unit
 from surface.fit.wardrobe.styles import Style, step, tangent
@@ -48,7 +48,7 @@ THIN = Sweep(RECEDED, 2.6, 3.6, 0.8, 0.25, 34.0, SWEPT)
 def short(skin: Skin) -> Style:
     """Strands go from the crown to the line all round, and over it on the forehead, in a fringe to one side that leaves
     the temples free."""
-    line = Hairline(skin)
+    line = Hairline(skin, SLANTED)
 
     def thickness(at: Floats) -> Floats:
         full = 1.6 + 9.0 * _top(at) + 2.0 * _top(at) * step(at[:, 2], 30.0, 75.0) + 1.6 * step(at[:, 1], 10.0, 60.0)
@@ -61,7 +61,7 @@ def short(skin: Skin) -> Style:
         return tangent(away * (0.8 + 0.2 * top) + 0.5 * top * aside + 0.45 * (1.0 - top) * _down(at, normals), normals)
 
     def cut(at: Floats) -> Floats:
-        fringe = step(at[:, 2], 50.0, 82.0) * step(-np.abs(at[:, 0] - 6.0), -48.0, -16.0)
+        fringe = step(at[:, 2], 44.0, 80.0) * step(-np.abs(at[:, 0] - 6.0), -64.0, -16.0)
         lower = 13.0 + 7.0 * step(at[:, 0], -30.0, 30.0)
         return np.asarray(line.inside(at) + 1.0 + lower * fringe)
 

@@ -106,8 +106,9 @@ def _colour_below(part: HeadPart, garments: Sequence[Garment]) -> None:
             darker = np.clip(1.0 - below.mean() / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3), 0.0, 1.0)
             share = cover * (1.0 - THROUGH * (1.0 - darker))
             albedo = albedo + share * (below - albedo)
-            if "occlusion" in part.attributes:
-                part.attributes["occlusion"] = part.attributes["occlusion"] * (1.0 - SHADED * share)
+            for name, less in (("occlusion", SHADED), ("gloss", 1.0)):  # what hair covers does not shine
+                if name in part.attributes:
+                    part.attributes[name] = part.attributes[name] * (1.0 - less * share)
         shadow = sample_picture(garment, "shadow", part)
         if shadow is not None and "occlusion" in part.attributes:
             part.attributes["occlusion"] = part.attributes["occlusion"] * (1.0 - shadow)

@@ -4,13 +4,14 @@
 #define NEIGHBOURS vec3(0.84, 0.82, 0.80)
 #define DEEP_MM vec2(12.0, 40.0)  // behind the lips: where the mouth's inside begins to be deep, and where it is
 #define ARCH_MM 45.0              // how far behind the lips the middle of the row of teeth lies
-#define ROUND_WALLS vec3(1.0, 0.86, 0.78)
+#define ROUND_WALLS vec3(1.0, 0.92, 0.87)
 #define CREVICE vec3(0.34, 0.19, 0.15)  // of the light, what is left between two teeth and at the gum
 #define OPEN_SHARE 0.55                 // of the sky that a tooth sees, from which on it is in the open
 
-#define CORNER vec3(0.68, 0.57, 0.53)   // of the light, what lips and cheek leave to teeth at the corners of the mouth
+#define CORNER vec3(0.54, 0.46, 0.43)   // of the light, what lips and cheek leave to teeth at the corners of the mouth
 #define CORNER_AT vec2(0.45, 1.0)       // of the way there: where they begin to shade them, and where they do
 #define BEHIND vec3(0.56, 0.50, 0.49)    // of the light, what the tongue leaves to the inner sides of teeth far back
+#define TONGUE_WET 0.35                  // nothing but a tongue is as wet
 #define BEHIND_MM vec2(2.0, 22.0)       // behind the lips: where it begins to lie before them, and where it does
 
 uniform mat4 view_projection;
@@ -56,7 +57,7 @@ void main() {
     vec3 outwards = normalize(dot(away, side) * side + (past + ARCH_MM) * out_of);
     float inwards = teeth * smoothstep(0.0, 0.5, -dot(n, outwards));
     float behind = teeth * max(deep, inwards * smoothstep(BEHIND_MM.x, BEHIND_MM.y, -past));
-    vec3 own = mix(mix(albedo, GUM, shade.y), WALLS, max(0.16 * inwards, 0.20 * behind));
+    vec3 own = mix(mix(albedo, GUM, shade.y), WALLS, max(0.06 * inwards, 0.08 * behind));
     n = normalize(mix(n, out_of, 0.55 * deep));
     vec3 tint = mix(vec3(1.0), ROUND_WALLS, max(deep, inwards));
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)
@@ -65,17 +66,18 @@ void main() {
     float open = mix(occlusion, 1.0, max(0.5 * deep, 0.5 * teeth));
     float area = length(opening_area);
     float direct = mix(daylight(n) * open, 0.28 * area / (area + 400.0), inwards);
-    float reach = mix(clamp(direct, 0.0, 1.0), 1.0, smoothstep(-2.0, 4.0, past));
+    // What is out lets light under itself, and the tongue is the only thing that comes out far.
+    float reach = mix(clamp(direct, 0.0, 1.0), 1.0, smoothstep(-2.0 - 10.0 * step(TONGUE_WET, wetness), 4.0, past));
     // Light bounces between here and the red walls of the mouth: the less comes straight in, the more that counts.
     // Teeth pass it on to each other, whiter than those walls do.
     // Gums before the row have teeth beside them, too.
     float before = step(0.2, albedo.g) * (1.0 - inwards) * (1.0 - deep);
-    vec3 bounce = mix(0.5 * (own + WALLS), NEIGHBOURS, 0.9 * max(teeth * (1.0 - inwards), 0.8 * before));
+    vec3 bounce = mix(0.5 * (own + WALLS), NEIGHBOURS, 0.9 * max(teeth * (1.0 - 0.4 * inwards), 0.8 * before));
     vec3 arrives = reach / (reach + (1.0 - reach) * (1.0 - 0.9 * bounce));
     arrives *= mix(vec3(1.0), mix(CREVICE, vec3(1.0), smoothstep(0.0, OPEN_SHARE, occlusion)), teeth * (1.0 - 0.7 * behind));
     arrives *= mix(vec3(1.0), BEHIND, behind);
     float sideways = (1.0 - deep) * abs(dot(away, side)) / length(opening_side);
-    arrives *= mix(vec3(1.0), CORNER, teeth * (1.0 - inwards) * smoothstep(CORNER_AT.x, CORNER_AT.y, sideways));
+    arrives *= mix(vec3(1.0), CORNER, teeth * smoothstep(CORNER_AT.x, CORNER_AT.y, sideways));
     float nh = dot(n, normalize(key_direction + v));
     float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach * (1.0 - behind);  // else far teeth glitter
     v_colour = encode(own * tint * light * arrives + shine * key_colour);

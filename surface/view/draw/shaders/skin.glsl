@@ -2,6 +2,8 @@
 #define WIDE_SHARPNESS 11.0     // the narrow lobe is the wide one to the fourth power
 #define WIDE 0.150              // of the gloss, as NARROW
 #define NARROW 0.27
+#define SATIN 1.25              // of the gloss, for sky and fill light, in skin so dark that hardly any spreads under it
+#define SATIN_MOST 0.24         // of the gloss, that counts: lips have theirs
 
 uniform vec3 wrap;
 uniform vec3 through;           // colour of light that comes through thin skin
@@ -40,6 +42,17 @@ vec3 diffuse(vec3 n, vec3 v, vec3 albedo, float occlusion, float sun, float back
     light += thin * occlusion * occlusion * through * glow;
     vec3 sheen = 0.16 * ambient(n) + 0.12 * rim_colour * back * clamp(rim + 0.4, 0.0, 1.0);
     return albedo * light * mix(vec3(1.0), open, 0.35) + grazing(n, v) * occlusion * sheen;
+}
+
+// The surface itself mirrors, softly, what comes from above and from before: where melanin takes the light that spreads
+// below it, that shows cheekbone, brow and temple.
+vec3 satin(vec3 n, vec3 v, float red, float occlusion, float gloss) {
+    float mirrored = max(dot(n, normalize(v + key_direction + 0.5 * fill_direction + vec3(0.0, 0.4, 0.0))), 0.0);
+    mirrored *= mirrored;
+    mirrored *= mirrored;
+    mirrored *= mirrored;
+    float dark = clamp(1.0 - 2.2 * red, 0.0, 0.6);
+    return SATIN * min(gloss, SATIN_MOST) * dark * occlusion * mirrored * mirrored * (sky + fill_colour);
 }
 
 // Scale of the key light's highlights: none in the shade, more at grazing angles.

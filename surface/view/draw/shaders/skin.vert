@@ -35,7 +35,8 @@ void main() {
     vec3 albedo = albedo_occlusion.rgb * albedo_occlusion.rgb;
     float sun = reaching(around, key_at_rest);
     float strength = highlight(normal, v) * albedo_occlusion.a * sun * surface_uv_gloss.z;
-    v_diffuse = diffuse(normal, v, albedo, albedo_occlusion.a, sun, reaching(around, rim_at_rest), surface_uv_gloss.w);
+    v_diffuse = diffuse(normal, v, albedo, albedo_occlusion.a, sun, reaching(around, rim_at_rest), surface_uv_gloss.w)
+        + satin(normal, v, albedo.r, albedo_occlusion.a, surface_uv_gloss.z);
     v_normal_wide = vec4(normal, WIDE * strength);
     v_half_narrow = vec4(normalize(key_direction + v), NARROW * strength);
     v_uv = surface_uv_gloss.xy;

@@ -35,7 +35,7 @@ void main() {
     float shine = highlight(normal, v) * albedo_occlusion.a * sun * surface_uv_gloss.z
         * (WIDE * wide + SMEARED * narrow);
     vec3 lit = diffuse(normal, v, albedo, albedo_occlusion.a, sun, reaching(around, rim_at_rest), surface_uv_gloss.w);
-    lit += shine * key_colour;
+    lit += shine * key_colour + satin(normal, v, albedo.r, albedo_occlusion.a, surface_uv_gloss.z);
 #ifdef PANELS
     v_light = lit;
     v_uv = surface_uv_gloss.xy;

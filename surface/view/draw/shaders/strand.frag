@@ -40,9 +40,13 @@ void main() {
     float over = v_strand.z - height;
     float cover = step(0.0, over);
 #ifndef GRAIN_TEXELS
+    float soft = mix(SOFT.x, SOFT.y, clamp(1.6 * v_strand.z, 0.0, 1.0));
     if (multisampled) {
-        float soft = mix(SOFT.x, SOFT.y, clamp(1.6 * v_strand.z, 0.0, 1.0));
         cover = clamp(over / max(fwidth(over), soft) + 0.5, 0.0, 1.0);
+    } else {
+        // With one sample a strand fades pixel by pixel, in an order without pattern, which smooth.frag levels.
+        float order = fract(52.983 * fract(dot(gl_FragCoord.xy, vec2(0.06711, 0.00584))));
+        cover = step((order - 0.5) * soft, over);
     }
 #endif
     if (cover <= 0.0) {

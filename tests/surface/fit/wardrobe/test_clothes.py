@@ -98,3 +98,14 @@ def test_a_turtlenecks_collar_is_rolled_down_over_itself(skin: Skin) -> None:
     below = garment(skin, neck)[0].strands[0, 0, :, 3]
     dark = below[2:].argmin() + 2  # past the inside
     assert below[:dark].max() > below[dark] + 0.3 < below[-1]  # and in its shade
+
+
+def test_a_folded_collar_lies_against_the_neck_where_its_edges_meet(skin: Skin) -> None:
+    """Seen from the side it does not jut out there as a board: it stands out less than over its points."""
+    angle = module._dense_in_front(module._FOLDED)
+    ring = module._ring(skin, NECKS["clothes-shirt"], angle)
+    rows = np.array(module._folded(skin, ring, angle))
+    front, point = (int(np.abs(np.abs(angle) - at).argmin()) for at in (0.0, 0.4))
+    out = rows[..., 2] - rows[0, :, 2]
+    assert 0.0 < out[:, front].max() < 5.0
+    assert out[-1, front] < out[-1, point]

@@ -98,9 +98,10 @@ def test_colours_of_another_mesh_are_refused(head: Head) -> None:
     assert caught.value.hint
 
 
-def test_skin_below_has_the_colour_of_hair_and_lies_in_its_shade(head: Head) -> None:
+def test_skin_below_has_the_colour_of_hair_lies_in_its_shade_and_does_not_shine(head: Head) -> None:
     skin = head.part("a")
     skin.attributes["occlusion"] = np.full((len(skin.vertices), 1), 0.8, np.float32)
+    skin.attributes["gloss"] = np.full((len(skin.vertices), 1), 0.3, np.float32)
     before = skin.attributes["albedo"].copy()
     across = np.tile(np.linspace(0, 1, 3)[:, None], (1, 4))  # a picture that rises with u
     dress(head.parts, [garment(head, {"cover/a": across, "shadow/a": 0.5 * across, "cover/tooth": across})])
@@ -110,6 +111,7 @@ def test_skin_below_has_the_colour_of_hair_and_lies_in_its_shade(head: Head) -> 
     share = u * (1 - THROUGH * light)
     np.testing.assert_allclose(skin.attributes["albedo"], before + share * (below - before), atol=1e-5)
     np.testing.assert_allclose(skin.attributes["occlusion"], 0.8 * (1 - SHADED * share) * (1 - 0.5 * u), atol=1e-5)
+    np.testing.assert_allclose(skin.attributes["gloss"], 0.3 * (1 - share), atol=1e-5)
     assert skin.attributes["albedo"].dtype == np.float32
 
 

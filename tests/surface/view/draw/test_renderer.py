@@ -377,3 +377,34 @@ def test_strands_cover_a_share_of_a_pixel_where_it_has_several_samples(
     steps = [int((np.abs(np.diff(picture[60:100], axis=1)).max(axis=2) > 90).sum()) for picture in pictures]
     assert 0 < steps[0] < 0.75 * steps[1]
     assert shared.mean() == pytest.approx(stepped.mean(), rel=0.02)
+
+
+def blocks(picture: np.ndarray) -> np.ndarray:
+    """Means over squares of five pixels of a picture's middle."""
+    return np.asarray(picture[40:100, 50:150].reshape(12, 5, 20, 5, 3).mean(axis=(1, 3)))
+
+
+def test_strands_fade_pixel_by_pixel_where_it_has_one_sample(gl: None) -> None:
+    """Seen from afar they are as thick as with several samples, and no blots."""
+    drawn = []
+    for samples in (4, 1):
+        with Offscreen(HairyHead(), SIZE, samples=samples) as screen:
+            drawn.append(blocks(screen.render(values()).astype(float)))
+    assert np.abs(drawn[1] - drawn[0]).mean() < 5.4
+
+
+@pytest.mark.parametrize("quality", ["full", "fast"])
+@pytest.mark.parametrize(("red", "mirrored"), [(0.08, True), (0.6, False)])
+def test_the_surface_of_dark_skin_mirrors_what_is_above(gl: None, quality: str, red: float, mirrored: bool) -> None:
+    """The key light, whose highlights follow the gloss on every skin, is off."""
+    theme, shown = replace(find_theme("skin"), key=Light(-34.0, 32.0, (0.0, 0.0, 0.0))), []
+    for gloss in (0.0, 0.24):
+        head = BallHead()
+        skin = head.parts[0]
+        skin.attributes["albedo"] = np.tile(np.float32([red, 0.5 * red, 0.4 * red]), (len(skin.rest), 1))
+        skin.attributes["gloss"] = np.full((len(skin.rest), 1), gloss, np.float32)
+        with Offscreen(head, SIZE, quality=quality, theme=theme) as screen:
+            picture = screen.render(values()).astype(int)
+            shown.append([middle(picture, 0.5, at).sum() for at in (0.3, 0.8)])
+    forehead, chin = np.subtract(shown[1], shown[0])
+    assert (forehead > chin + 20.0) == mirrored and (mirrored or forehead == chin == 0.0), (forehead, chin)
