@@ -281,7 +281,7 @@ def _fit_parts(
 def part_chart(mesh: FitMesh, part: PartRecipe, islands: list[Island]) -> Chart:
     """The chart of one part of a plan: its islands in tiles, or one skin around them."""
     if part.wrapped:
-        return wrap_chart(mesh, islands)
+        return wrap_chart(mesh, islands, even=part.even)
     return make_chart(mesh, islands, normalise=part.tiled, downweight_slivers=part.downweight_slivers)
 
 
