@@ -172,16 +172,17 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
         plan.notes.extend([*lid_notes, *squint_notes])
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
-    head = localised(head, scale)
+    head, local = localised(head, scale)
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
     head = with_greatest_error(head, str(dense.greatest) if dense.greatest else "")
-    notes = [*worn.notes, *loaded.notes, *plan.notes, *turned_faces(mesh), *mended]
+    notes = [*worn.notes, *loaded.notes, *plan.notes, *turned_faces(mesh), str(local), *mended]
     notes += findings(head, loaded.marks, _kinds(loaded), {one.kind for one in worn.accessories})
     notes += overlap_notes(head, MeshOverlaps(head, mesh, sources, fitted_parts, scale).depth)
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
         loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets,
         {**loaded.pieces, **worn.pieces}, dense, tuple(faults_of(dense, fitted_parts, scale)), loaded.named.filled,
+        local,
     )  # fmt: skip
     return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts), worn.accessories)
 

@@ -141,7 +141,7 @@ def test_skin_is_not_folded_to_close_a_gap_that_the_lids_hardly_reach(reached, l
         def move_sides(self, amounts, points) -> None:
             points[:, 1] += amounts
 
-    part = SimpleNamespace(points=at + [0.0, 8.0 / reached, 0.0])  # at rest the eye is 10 mm open
+    part = SimpleNamespace(points=at + np.array([0.0, 8.0 / reached, 0.0]))  # at rest the eye is 10 mm open
     closed, was_open, is_open = lids._closed(part, at, at, Solver())
     assert (was_open, is_open) == (2.0, pytest.approx(left, abs=0.1))
     assert np.linalg.norm(closed - at) <= drawn_lids.MOST_MOVED * (was_open - is_open) + 1e-9

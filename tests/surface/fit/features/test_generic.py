@@ -267,7 +267,9 @@ def test_a_tongue_whose_texture_is_cut_up_gets_one_skin() -> None:
         ("Tongue", cut, 2, False),
         ("Tongue", squares((0.0, 0, 100.0, 0)), 1, False),
     ):
-        mesh = joined([(name, replace(body, vertices=body.vertices + [40.0 * k, 0, 0])) for k in range(count)])
+        mesh = joined(
+            [(name, replace(body, vertices=body.vertices + np.array([40.0 * k, 0.0, 0.0]))) for k in range(count)]
+        )
         label, sizes = generic._pieces(mesh)
         ((part, islands),) = generic._others(mesh, label, list(range(len(sizes))), 40_000.0, 1.0, [])
         assert (part.wrapped, part.even) == (wanted, wanted)
