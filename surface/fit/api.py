@@ -27,7 +27,7 @@ from surface.fit.features.generic import Plan, make_plan
 from surface.fit.features.joins import find_seams
 from surface.fit.features.levelled import level_seams
 from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
-from surface.fit.features.rigging import find_jaw
+from surface.fit.features.rigging import find_jaw, take_tongue
 from surface.fit.features.wrinkles import with_deep_wrinkles
 from surface.fit.filling.api import Filling, filled
 from surface.fit.measures.dense import errors_at_rest
@@ -216,6 +216,8 @@ def _planned(loaded: Loaded, where: str) -> _Planned:
     mesh, exchanged = correct_shapes(to_arkit(loaded.mesh, loaded.named))
     plan = make_plan(mesh)
     plan.notes.extend(exchanged)
+    mesh, taken = take_tongue(mesh, plan.vertices_of("tongue"), plan.jaw)
+    plan.notes.extend(taken)
     mesh, seated = fit_lids(mesh, plan.found) if plan.found else (mesh, [])
     plan.notes.extend(seated)
     return _Planned(loaded, Recipe([]), mesh, plan)

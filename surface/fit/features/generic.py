@@ -64,6 +64,11 @@ class Plan:
     notes: list[str] = field(default_factory=list)
     found: Eyes | None = None
 
+    def vertices_of(self, material: str) -> Ints:
+        """The mesh's vertices in parts of a material."""
+        own = [island.vertex for part, islands in self.parts if part.material == material for island in islands]
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *own]))
+
 
 def make_plan(mesh: FitMesh) -> Plan:
     """Sort the mesh's pieces; its shapes are named as ARKit's.

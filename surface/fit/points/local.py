@@ -54,7 +54,9 @@ def _told(shapes: Sequence[tuple[PartData, Group, Group, float | None]]) -> Loca
     for part, group, _, off in named:
         if off is None:
             whole.setdefault(part.name, []).append(group.name)
-    before, after = (sum(len(each[k].ids) for each in named) for k in (1, 2))
+    before, after = (
+        sum(len(g.ids) for g in groups) for groups in ([b for _, b, _, _ in named], [a for _, _, a, _ in named])
+    )
     most = max(named, key=lambda each: each[3] or 0.0, default=None)
     if most is None or not most[3]:
         return Localised(before, after, whole=whole)
