@@ -425,10 +425,10 @@ def test_a_meshs_own_lips_that_are_slightly_apart_are_closed_in_the_middle_and_l
         solver.apply(AHEAD, surface.points.copy(), 1.0)
         gaps.append(solver.gaps()[0])
     ends, middle = [0, -1], slice(4, 7)
-    assert (gaps[0][ends] > 0.1).all() and (gaps[0][ends] < 0.3).all() and (gaps[0][middle] < -0.5 * HIDDEN_MM).all()
+    assert (gaps[0][ends] > 0.2).all() and (gaps[0][middle] < -0.5 * HIDDEN_MM).all()
     assert (gaps[1] < -0.4 * HIDDEN_MM).all(), "an identity's are closed everywhere"
     fade = corner_fade(COLUMNS)
-    assert fade[[0, 1, 2, -1]] == pytest.approx([7 / 27, 20 / 27, 1.0, 7 / 27]) and (np.diff(fade[:6]) >= 0.0).all()
+    assert fade[[0, 1, 2, 3, -2, -1]] == pytest.approx([2 / 27, 0.5, 25 / 27, 1.0, 0.5, 2 / 27])
 
 
 def test_a_seal_leaves_an_opening_that_stands_open_at_rest() -> None:
