@@ -27,7 +27,7 @@ from surface.fit.features.generic import Plan, make_plan
 from surface.fit.features.joins import find_seams
 from surface.fit.features.levelled import level_seams
 from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
-from surface.fit.features.rigging import find_jaw
+from surface.fit.features.rigging import find_jaw, take_tongue
 from surface.fit.features.wrinkles import with_deep_wrinkles
 from surface.fit.filling.api import Filling, filled
 from surface.fit.measures.dense import errors_at_rest
@@ -177,16 +177,17 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     texture = _texture(mesh, plan)
     missing = tuple(n for n in loaded.named.missing if not any(g.name == n for p in head.parts for g in p.groups))
     moving = sorted({*sources, *loaded.named.missing} - {*missing})
-    head = localised(head, scale)
+    head, local = localised(head, scale)
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
     head = with_greatest_error(head, str(dense.greatest) if dense.greatest else "")
-    notes = [*worn.notes, *loaded.notes, *plan.notes, *turned_faces(mesh), *mended]
+    notes = [*worn.notes, *loaded.notes, *plan.notes, *turned_faces(mesh), str(local), *mended]
     notes += findings(head, loaded.marks, _kinds(loaded), {one.kind for one in worn.accessories})
     notes += overlap_notes(head, MeshOverlaps(head, mesh, sources, fitted_parts, scale).depth)
     report = FitReport(
         name, reports, moving, missing, loaded.named.left_out, notes, scale,
         loaded.named.made_of(loaded.mesh.names), loaded.named.empty, loaded.named.presets,
         {**loaded.pieces, **worn.pieces}, dense, tuple(faults_of(dense, fitted_parts, scale)), loaded.named.filled,
+        local,
     )  # fmt: skip
     return FitResult(head, report, fitted_parts, errors_at_rest(head, mesh, charts), worn.accessories, texture)
 
@@ -230,6 +231,8 @@ def _planned(loaded: Loaded, where: str) -> _Planned:
     mesh, exchanged = correct_shapes(to_arkit(loaded.mesh, loaded.named))
     plan = make_plan(mesh)
     plan.notes.extend(exchanged)
+    mesh, taken = take_tongue(mesh, plan.vertices_of("tongue"), plan.jaw)
+    plan.notes.extend(taken)
     mesh, seated = fit_lids(mesh, plan.found) if plan.found else (mesh, [])
     plan.notes.extend(seated)
     return _Planned(loaded, Recipe([]), mesh, plan)
@@ -296,7 +299,7 @@ def _fit_parts(
 def part_chart(mesh: FitMesh, part: PartRecipe, islands: list[Island]) -> Chart:
     """The chart of one part of a plan: its islands in tiles, or one skin around them."""
     if part.wrapped:
-        return wrap_chart(mesh, islands)
+        return wrap_chart(mesh, islands, even=part.even)
     return make_chart(mesh, islands, normalise=part.tiled, downweight_slivers=part.downweight_slivers)
 
 

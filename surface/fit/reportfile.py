@@ -59,6 +59,7 @@ def _as_table(report: FitReport, nets: list[UniformNet]) -> dict[str, Any]:
         "missing": list(report.missing), "left_out": list(report.left_out), "notes": list(report.notes),
         "faults": list(report.faults),
         "shapes": report.shapes, "filled": report.filled,
+        "localised": asdict(report.localised) if report.localised else None,
         "empty": list(report.empty), "presets": list(report.presets), "pieces": report.pieces,
         "parts": [
             {

@@ -39,6 +39,7 @@ STIFFNESS = 0.02  # weight of moving no control point
 HOLD_WEIGHT = 0.05  # weight of moving no sample that is high enough
 TOLERANCE = 0.0025  # in radii: height that may be missing
 MAX_CLOSINGS = 6  # corrections of a blink
+MOST_MOVED = 3.0  # times the height of a gap, of the way that skin may go to close it: a fold would be worse than it
 MAX_CORRECTIONS = 3  # of a head, one after the other
 PIXEL = 0.008  # in radii, of the picture in which the open eye is measured
 OVERLAP = 0.02  # in radii, by which a gap is closed further than it was open
@@ -191,21 +192,27 @@ class DrawnLids:
         self, part: PartData, before: Floats, points: Floats, solver: ContactSolver
     ) -> tuple[Floats, float, float]:  # fmt: skip
         """Control points (n, 3) of a blink, as groups have moved them, moved on until it is drawn shut; and how much of
-        the eye, mm, ``before`` and they leave open. Only such blinks are changed as shut most of the eye."""
+        the eye, mm, ``before`` and they leave open. Only such blinks are changed as shut most of the eye. What is
+        open beside the columns of the contact, which cannot reach it, stays rather than folds the skin around it."""
         was_open = self._most_open(_posed(before, FORWARD, solver))
-        best, least, points = points, np.inf, points.copy()
+        start, best, first, points = points, points, self._most_open(_posed(points, FORWARD, solver)), points.copy()
+        least = np.inf
         if was_open > MAX_LEFT_OPEN * self._most_open(part.points):
             return best, was_open, was_open
         for k in range(MAX_CLOSINGS):
             posed = _posed(points, FORWARD, solver)
             x, seen = self._open(posed)
-            if seen.max() < least:
+            if seen.max() < least and self._way(points - start) <= MOST_MOVED * max(first - seen.max(), 0.0):
                 best, least = points.copy(), float(seen.max())
             if least <= PIXEL * self._radius:
                 break
             solver.move_sides(-(1.0 + k) * self._needs(posed, x, seen), points)  # corners follow only in part
             points = self._cleared(points, FORWARD, solver)
         return best, was_open, least
+
+    def _way(self, moves: Floats) -> float:
+        """How far moves (n, 3) of control points take the skin of the lids at most, mm."""
+        return float(np.linalg.norm(self._samples @ moves, axis=1).max(initial=0.0))
 
     def _most_open(self, points: Floats) -> float:
         return float(self._open(points)[1].max())

@@ -41,6 +41,8 @@ DEPTH = 9  # of the cells: one in a nostril is 3 mm wide then; more where many i
 # shared by all
 LEAST, MOST_ISLANDS = 40, 80  # control points of a small island; islands of one part
 MOVING = 0.4  # an island moved by at least this share of the shapes that move the most mobile one is the face's
+TONGUE = "tongue"  # one whose texture is cut up gets one skin around all of it: it would be creased where islands end
+TONGUE_POINTS, TONGUE_FAIR = 300, 0.003  # of that skin: smooth, for a tongue of few faces has corners
 LESS = 1e-6  # what is said to be no skin counts as face only where there is nothing else
 MOVES_MM = 1.0  # of a head of usual size: what moves less does not count as moved
 
@@ -61,6 +63,11 @@ class Plan:
     jaw: Ints
     notes: list[str] = field(default_factory=list)
     found: Eyes | None = None
+
+    def vertices_of(self, material: str) -> Ints:
+        """The mesh's vertices in parts of a material."""
+        own = [island.vertex for part, islands in self.parts if part.material == material for island in islands]
+        return np.unique(np.concatenate([np.zeros(0, np.int64), *own]))
 
 
 def make_plan(mesh: FitMesh) -> Plan:
@@ -189,9 +196,16 @@ def _others(
         if kind.material == cavity.MATERIAL:
             out.append(_lining(title, scale, islands, mesh))
         else:
-            out.append(_part(title, kind.material, points, 0.34, 0.5, scale, islands, mesh))
+            part = _part(title, kind.material, points, 0.34, 0.5, scale, islands, mesh)
+            cut_up = kind.material == TONGUE and len(own) == 1 and len(islands) > 1
+            out.append((_wrapped(part[0]), islands) if cut_up else part)
         notes.append(f"{name!r}: {kind.name}: {len(islands)} islands as {title}")
     return out
+
+
+def _wrapped(part: PartRecipe) -> PartRecipe:
+    """The part as one smooth skin around all its islands."""
+    return replace(part, wrapped=True, even=True, request=replace(part.request, points=TONGUE_POINTS, fair=TONGUE_FAIR))
 
 
 def _area(mesh: FitMesh, island: Island) -> float:

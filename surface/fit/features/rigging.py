@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -16,6 +17,7 @@ from surface.head.posing.rig import jaw_path
 
 LEAST_MM = 0.004  # displacements smaller than this are dropped
 LEAST_GROUP_MM = 0.25  # a part gets no group for a shape that moves nothing in it further than this
+LEFT_BEHIND = 0.4  # of the jaw's way: a tongue that goes less far is no tongue of that jaw
 DROOP = "tongueDroop"
 DROOP_RULE = Rule(DROOP, ({"tongueOut": 1.0},), 4.0)
 LOW = "tongueLow"
@@ -38,6 +40,25 @@ def find_jaw(mesh: FitMesh, sources: dict[str, list[int]], teeth: Ints, hinge: F
     glide[0] = 0.0
     tilts = {n: affine_fit(rest, move) for n, move in moves.items()}
     return Jaw(tuple(hinge.tolist()), angle, tuple(glide.tolist()), tilts)
+
+
+def take_tongue(mesh: FitMesh, tongue: Ints, chin: Ints) -> tuple[FitMesh, list[str]]:
+    """The mesh with a tongue that goes down with the jaw where its maker's jawOpen leaves it at the palate, so that it
+    would hang before the upper teeth; and what was made, in words.
+
+    tongue, chin : vertices; the latter move with the jaw as a whole.
+    """
+    if not len(tongue) or not len(chin) or "jawOpen" not in mesh.names:
+        return mesh, []
+    k, rest = mesh.names.index("jawOpen"), mesh.vertices
+    turn, shift = rigid_fit(rest[chin], rest[chin] + mesh.deltas[k][chin])
+    whole = rest[tongue] @ turn.T + shift - rest[tongue]
+    goes, jaw = (float(np.linalg.norm(moves, axis=1).mean()) for moves in (mesh.deltas[k][tongue], whole))
+    if goes >= LEFT_BEHIND * jaw:
+        return mesh, []
+    deltas = mesh.deltas.copy()
+    deltas[k][tongue] = whole
+    return replace(mesh, deltas=deltas), [f"jawOpen left the tongue behind, {jaw - goes:.0f} mm: it follows the jaw"]
 
 
 def affine_fit(points: Floats, moves: Floats) -> Floats:

@@ -15,6 +15,7 @@ from scipy.sparse.linalg import splu
 
 from surface.base.arrays import Bools, Floats
 from surface.dcp import DCPSurface
+from surface.fit.points.report import Localised
 from surface.head.model.data import Contact, Group, HeadData, PartData
 from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.head.model.parameters import SHAPES, smoothstep
@@ -28,27 +29,51 @@ FULL_SHARE = 0.999  # with more it moves as before
 RIDGE = 1e-3  # weight of keeping the points' displacements, relative to a sample's
 
 
-def localised(head: HeadData, scale: float) -> HeadData:
-    """Return the head whose shapes leave skin still that they would move by less than :data:`STILL_MM`.
+def localised(head: HeadData, scale: float) -> tuple[HeadData, Localised]:
+    """Return the head whose shapes leave skin still that they would move by less than :data:`STILL_MM`, and how much
+    less of it they move.
 
     scale : size of the head relative to a usual one.
 
     A group that would be off by more than :data:`OFF_MM` somewhere stays as it is.
     """
-    contacts = {p.name: [c for c in head.contacts if c.part == p.name] for p in head.parts}
-    parts = [_local_part(p, head, contacts[p.name], scale) if p.follows == "skin" else p for p in head.parts]
-    return replace(head, parts=parts)
+    parts, told = [], []
+    for part in head.parts:
+        near = [c for c in head.contacts if c.part == part.name]
+        made = _local_part(part, head, near, scale) if part.follows == "skin" else None
+        parts.append(part if made is None else replace(part, groups=[g for g, _ in made if len(g.ids)]))
+        told += [(part, before, *after) for before, after in zip(part.groups, made or [], strict=False)]
+    return replace(head, parts=parts), _told(told)
 
 
-def _local_part(part: PartData, head: HeadData, contacts: Sequence[Contact], scale: float) -> PartData:
-    """The part with groups of shapes that act where these move it."""
+def _told(shapes: Sequence[tuple[PartData, Group, Group, float | None]]) -> Localised:
+    """What became of every shape's group of every part: before, after, and by how much it is off, mm; None for one that
+    would have been off too far."""
+    named = [each for each in shapes if each[1].name in SHAPES]
+    whole: dict[str, list[str]] = {}
+    for part, group, _, off in named:
+        if off is None:
+            whole.setdefault(part.name, []).append(group.name)
+    before, after = (
+        sum(len(g.ids) for g in groups) for groups in ([b for _, b, _, _ in named], [a for _, _, a, _ in named])
+    )
+    most = max(named, key=lambda each: each[3] or 0.0, default=None)
+    if most is None or not most[3]:
+        return Localised(before, after, whole=whole)
+    return Localised(before, after, float(most[3]), most[1].name, most[0].name, whole)
+
+
+def _local_part(
+    part: PartData, head: HeadData, contacts: Sequence[Contact], scale: float
+) -> list[tuple[Group, float | None]]:  # fmt: skip
+    """The part's groups, those of shapes such that they act where these move it; and how far each is off, mm, None for
+    those that stay since they would be off too far."""
     surface = make_surface(part)
     mesh = unpack(part.mesh, surface, part.budget, rough=True, flip=part.flip) or tessellate(part, surface, head.seams)
     centres = mesh.uv[mesh.triangles].mean(axis=1)  # inside triangles: at slits, borders belong to two sides
     weights = surface.basis_matrix(centres).tocsc()
     near = [_near(surface, c) for c in contacts]
-    groups = [_local_group(g, weights, near, scale) if g.name in SHAPES else g for g in part.groups]
-    return replace(part, groups=[g for g in groups if len(g.ids)])
+    return [_local_group(g, weights, near, scale) if g.name in SHAPES else (g, 0.0) for g in part.groups]
 
 
 def _near(surface: DCPSurface, contact: Contact) -> tuple[csc_matrix, Bools]:
@@ -60,8 +85,10 @@ def _near(surface: DCPSurface, contact: Contact) -> tuple[csc_matrix, Bools]:
     return weights, np.asarray(weights.getnnz(axis=0) > 0)
 
 
-def _local_group(group: Group, weights: csc_matrix, near: Sequence[tuple[csc_matrix, Bools]], scale: float) -> Group:
-    """The group with fewer points; the same where it cannot be told so.
+def _local_group(
+    group: Group, weights: csc_matrix, near: Sequence[tuple[csc_matrix, Bools]], scale: float
+) -> tuple[Group, float | None]:  # fmt: skip
+    """The group with fewer points, and how far it is off, mm; the same, and None, where it cannot be told so.
 
     Where it hardly moves a contact, it moves none of its points, and the contact need not be solved again.
     """
@@ -75,10 +102,10 @@ def _local_group(group: Group, weights: csc_matrix, near: Sequence[tuple[csc_mat
     wanted = share[:, None] * given
     for least in MIN_SHARES:
         local = _solved(moves, wanted, weights, share, held, least)
-        if _most(weights @ local - given) <= OFF_MM * scale:
+        if (off := _most(weights @ local - given)) <= OFF_MM * scale:
             ids = np.flatnonzero(local.any(axis=1))
-            return Group(group.name, ids.astype(np.int32), local[ids].astype(np.float32))
-    return group
+            return Group(group.name, ids.astype(np.int32), local[ids].astype(np.float32)), off
+    return group, None
 
 
 def _most(moves: Floats) -> float:

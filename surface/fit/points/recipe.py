@@ -27,7 +27,8 @@ Tables = list[dict[str, Any]]
 class PartRecipe:
     """One part: its vertices as ranges, what it looks like, what it follows, how finely it is fitted.
 
-    ``tiled`` : its islands are still to be put into tiles of their own; ``wrapped`` : one skin goes round all of them;
+    ``tiled`` : its islands are still to be put into tiles of their own; ``wrapped`` : one skin goes round all of them,
+    and ``even`` : its samples are as dense at the rim of something flat as elsewhere;
     ``downweight_slivers`` : its faces may be of any form and size; see :func:`surface.fit.source.chart.make_chart`;
     ``raised`` : how far it is moved upwards after the fit, mm.
     """
@@ -40,6 +41,7 @@ class PartRecipe:
     budget: tuple[int, float, int]
     tiled: bool = False
     wrapped: bool = False
+    even: bool = False
     downweight_slivers: bool = False
     raised: float = 0.0
 

@@ -176,6 +176,30 @@ class DenseErrors:
 
 
 @dataclass(frozen=True)
+class Localised:
+    """How much less of a head its shapes move, because skin that they would hardly move stays.
+
+    before, after : displacements of control points, over all shapes. off_mm : how far skin moves otherwise by that at
+        most, in which ``shape`` of which ``part``; "" where nothing does. whole : shapes that would have been off by
+        more than is allowed, and stay as they are, by part.
+    """
+
+    before: int
+    after: int
+    off_mm: float = 0.0
+    shape: str = ""
+    part: str = ""
+    whole: dict[str, list[str]] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        left = f"{self.before - self.after} of {self.before} displacements of control points are left out"
+        where = f", which moves skin otherwise by {self.off_mm:.2f} mm at most: shape {self.shape} ({self.part})"
+        kept = "; ".join(f"{', '.join(names)} ({part})" for part, names in self.whole.items())
+        text = f"skin that a shape hardly moves stays: {left}{where if self.shape else ''}"
+        return f"{text}; kept whole: {kept}" if kept else text
+
+
+@dataclass(frozen=True)
 class FitReport:
     """The whole head.
 
@@ -204,6 +228,7 @@ class FitReport:
     dense: DenseErrors | None = None
     faults: tuple[str, ...] = ()
     filled: dict[str, str] = field(default_factory=dict)
+    localised: Localised | None = None
 
     @property
     def points(self) -> int:

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from surface.base.arrays import Floats, Ints
 from surface.fit.source.chart import BORDER_WEIGHT, FOLD_WEIGHT, Chart
 from surface.fit.source.islands import Island
-from surface.fit.source.mesh import FitMesh, intersect, triangles
+from surface.fit.source.mesh import SMALL, FitMesh, intersect, triangles
 
 STATIONS, FAN, AROUND = 20, 18, 41  # rays along the line, over its tip, around it
 OVERLAP = 0.125  # of the way around, on either side, is sampled twice, so that slopes match where the skin is sewn
@@ -25,11 +25,14 @@ INSIDE = 0.02  # of a vertex' distance from the line: skin so much further out h
 END = 0.997  # of u: a tiny hole at the tip's pole is left out, so that normals are defined everywhere
 
 
-def wrap_chart(mesh: FitMesh, islands: list[Island]) -> Chart:
-    """One tile around all islands, which point forwards along z; half as wide as it is long."""
+def wrap_chart(mesh: FitMesh, islands: list[Island], *, even: bool = False) -> Chart:
+    """One tile around all islands, which point forwards along z; half as wide as it is long.
+
+    even : rays are as dense at the rim of a flat tongue as on its back, where few at equal angles would meet the rim.
+    """
     faces = np.concatenate([np.where(i.faces >= 0, i.vertex[i.faces], -1) for i in islands])
     corners = triangles(faces)
-    origins, rays, uv = _rays(mesh.vertices[np.unique(corners)])
+    origins, rays, uv = _rays(mesh.vertices[np.unique(corners)], even=even)
     which, shares = _hits(mesh.vertices[corners], origins, rays)
     mix = _filled(which, shares, corners, uv, len(mesh.vertices))
     spacing = np.tile([1.0 / (STATIONS + FAN - 1), (1.0 + 2.0 * OVERLAP) / (AROUND - 1)], (len(uv), 1))
@@ -39,14 +42,17 @@ def wrap_chart(mesh: FitMesh, islands: list[Island]) -> Chart:
     return Chart(uv, mix, weight, spacing, which < 0, [loop], [sewn], inner=_inner(mesh.vertices, corners))
 
 
-def _rays(points: Floats) -> tuple[Floats, Floats, Floats]:
-    """Origins and directions (r, 3) of rays through a tongue's skin, and where in (u, v) each hits it (r, 2)."""
+def _rays(points: Floats, *, even: bool = False) -> tuple[Floats, Floats, Floats]:
+    """Origins and directions (r, 3) of rays through a tongue's skin, and where in (u, v) each hits it (r, 2). even :
+    those around the line go to evenly turned places of an ellipse as wide and as high as the tongue."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle, length = low + HEIGHT * (high - low), high[2] - low[2]
     along = np.concatenate([np.linspace(ROOT, 1.0 - TIP_SHARE, STATIONS), np.full(FAN, 1.0 - TIP_SHARE)])
     t = np.concatenate([np.zeros(STATIONS), np.linspace(0.0, 1.0, FAN + 1)[1:]])[:, None]
     v = np.linspace(-OVERLAP, 1.0 + OVERLAP, AROUND)
-    side, up = -np.sin(2.0 * np.pi * v), -np.cos(2.0 * np.pi * v)
+    flat = (high[0] - low[0]) / max(high[1] - low[1], SMALL) if even else 1.0
+    side, up = -np.sin(2.0 * np.pi * v) * flat, -np.cos(2.0 * np.pi * v)
+    side, up = (x / np.hypot(side, up) for x in (side, up))
     wide, forward = np.cos(0.5 * np.pi * t), np.sin(0.5 * np.pi * t)
     cosine, sine = np.cos(BOW * t), np.sin(BOW * t)
     rays = np.stack([wide * side, wide * up * cosine - forward * sine, wide * up * sine + forward * cosine], axis=2)

@@ -237,9 +237,10 @@ def close_nearly(gaps: Floats, firm: Floats) -> None:
 
 
 def corner_fade(columns: int) -> Floats:
-    """Return (columns,): 0 at both corners of an opening, 1 from some columns inwards. Where the sides of a mesh are
-    apart close to a corner, which cannot move, closing them there would fold the skin beside it."""
-    from_corner = np.minimum(np.arange(columns), np.arange(columns)[::-1])
+    """Return (columns,): small at both ends of an opening, 1 from some columns inwards; 0 at the corners, half a column
+    beyond the outermost. Where the sides of a mesh are apart close to a corner, which cannot move, closing them there
+    would fold the skin beside it, and leaving them as they are would show a hole."""
+    from_corner = 0.5 + np.minimum(np.arange(columns), np.arange(columns)[::-1])
     fade: Floats = smoothstep(from_corner / _CORNER_COLUMNS)
     return fade
 

@@ -64,7 +64,8 @@ class SkinRig:
         self._followers = [(c.name, Follower(c, part.points, surfaces[c.part], head)) for c in others]
         self._clearances = _clearances(part, head)
         lips = any(c.eye < 0 and c.part != part.name for c in head.contacts)
-        out = lips and part.name and any(g.name == "tongueOut" for g in part.groups)  # parts joined in one have no name
+        tongue = part.material == "tongue" and part.name  # parts joined in one have no name
+        out = lips and tongue and any(g.name == "tongueOut" for g in part.groups)  # it moves teeth and skin, too
         self._head, self._rest = head, tongue_rest(part, head) if out else None
         self._lids = Lids(part, head, self._moves)
         self._amounts = np.zeros(len(self._moves.used))

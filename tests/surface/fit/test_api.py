@@ -53,6 +53,25 @@ def test_the_report_has_figures_for_every_part_and_shape(fitted):
     assert report.parameters == ["jawOpen", "mouthSmileLeft"]
 
 
+def test_a_tongue_that_the_jaw_leaves_behind_is_taken_along_before_anything_is_fitted():
+    sheet, (turn, pivot) = slit_sheet(), (0.35, np.array([0.0, 30.0, -60.0]))
+    swing = np.array([[1, 0, 0], [0, np.cos(turn), -np.sin(turn)], [0, np.sin(turn), np.cos(turn)]])
+    whole = (sheet.vertices - pivot) @ swing.T + pivot - sheet.vertices
+    below = sheet.vertices[:, 1] < 0
+    sheet = replace(sheet, names=("jawOpen",), deltas=np.where(below[:, None], whole, 0.0)[None])
+    tongue = replace(slit_sheet(), names=(), deltas=np.zeros((0, len(sheet.vertices), 3)))
+    tongue = replace(tongue, vertices=0.1 * tongue.vertices + [0.0, -20.0, -30.0])
+    mesh = joined([("Head", sheet), ("Tongue", tongue)])
+    planned = api._planned(Loaded(mesh, map_names(mesh.names)), "m.npz")
+    assert any(note.startswith("jawOpen left the tongue behind") for note in planned.plan.notes)
+    own = planned.plan.vertices_of("tongue")
+    rest = planned.mesh.vertices[own]
+    moved = planned.mesh.deltas[planned.mesh.names.index("jawOpen")][own]
+    assert len(own) == len(tongue.vertices) and np.linalg.norm(moved, axis=1).min() > 10.0
+    apart = np.linalg.norm(np.diff(rest + moved, axis=0), axis=1)
+    np.testing.assert_allclose(apart, np.linalg.norm(np.diff(rest, axis=0), axis=1), atol=1e-6)  # as a whole
+
+
 def test_progress_rises_to_the_end(fitted):
     _, _, heard = fitted
     done = [d for _, d in heard]

@@ -17,12 +17,14 @@ from surface.base.errors import FitError, ViewError
 from surface.fit import reportfile
 from surface.fit.api import fit_mesh
 from surface.fit.eyes.search import MISSING
+from surface.fit.points.local import OFF_MM
 from surface.fit.points.nurbsnet import UniformNet
 from surface.fit.points.report import Errors, FitReport, PartReport, face_bounds, kinds_line
 from surface.fit.reportfile import EXCLUDED, _colours, as_markdown, as_table, write_report
 from surface.fit.source.load import Loaded
 from surface.fit.source.names import map_names
 from surface.head import Head
+from surface.head.model.parameters import SHAPES
 
 NETS = [UniformNet(100, 0.5), UniformNet(110, 0.9), UniformNet(250, 0.45)]
 
@@ -211,6 +213,10 @@ def test_the_figures_are_those_of_the_fit(folder, result):
     assert table["left_out"] == ["odd"] and "tongueOut" in table["missing"]
     assert {"unit taken to be mm", MISSING} <= set(table["notes"])
     assert part["excluded_samples"] == int(result.parts[0].chart.folded.sum())
+    local = table["localised"]
+    assert 0 < local["after"] <= local["before"] and local["off_mm"] <= OFF_MM * table["scale"]
+    assert local["after"] == sum(len(g.ids) for p in result.head.parts for g in p.groups if g.name in SHAPES)
+    assert any(note.startswith("skin that a shape hardly moves stays: ") for note in table["notes"])
 
 
 @pytest.mark.slow

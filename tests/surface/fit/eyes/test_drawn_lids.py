@@ -1,6 +1,7 @@
 """Lids as they are drawn: above the eyeballs between vertices, too, and shut by a blink."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -123,6 +124,27 @@ def test_what_a_head_takes_only_in_part_is_corrected_again(share, left, asked) -
     lids = Part(share)
     assert lids.shut(4.0) == (left, 4.0, left)
     assert lids.asked == asked
+
+
+@pytest.mark.parametrize(("reached", "left"), [(1.0, 0.0), (0.4, 0.0), (0.05, 2.0)])
+def test_skin_is_not_folded_to_close_a_gap_that_the_lids_hardly_reach(reached, left, monkeypatch) -> None:
+    """An eye of which ``reached`` of the lids' way shuts: the way is at most three times what it closes."""
+    at = np.array([[0.0, 2.0, 12.0]])
+    lids = bare_lids(at)
+    monkeypatch.setattr(lids, "_open", lambda p: (np.zeros(1), np.maximum(2.0 - reached * (2.0 - p[:, 1]), 0.0)))
+    monkeypatch.setattr(lids, "_needs", lambda points, x, seen: seen)
+    monkeypatch.setattr(lids, "_cleared", lambda points, axis, solver: points)
+
+    class Solver:
+        def apply(self, axis, points) -> None: ...
+
+        def move_sides(self, amounts, points) -> None:
+            points[:, 1] += amounts
+
+    part = SimpleNamespace(points=at + np.array([0.0, 8.0 / reached, 0.0]))  # at rest the eye is 10 mm open
+    closed, was_open, is_open = lids._closed(part, at, at, Solver())
+    assert (was_open, is_open) == (2.0, pytest.approx(left, abs=0.1))
+    assert np.linalg.norm(closed - at) <= drawn_lids.MOST_MOVED * (was_open - is_open) + 1e-9
 
 
 def bare_lids(at: np.ndarray, radius: float = 12.0) -> DrawnLids:

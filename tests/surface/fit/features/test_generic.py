@@ -253,6 +253,29 @@ def test_only_skin_is_calmer_than_its_mesh() -> None:
     assert [p.request.calm_mm for p, _ in parts] == [0.0, 2.0 * generic.CALM_MM, 0.0]
 
 
+def test_a_tongue_whose_texture_is_cut_up_gets_one_skin() -> None:
+    """But not two tongues, or gums, or a tongue that is in one island."""
+    whole = ball((0.0, -20, 0), 8)
+    corner = np.arange(whole.faces.size).reshape(whole.faces.shape)
+    halves = corner + 0 * whole.faces
+    uv = whole.vertices[whole.faces.ravel()][:, :2] / 100.0
+    uv[(whole.vertices[whole.faces].mean(axis=1)[:, 2] > 0.0).repeat(whole.faces.shape[1])] += [2.0, 0.0]
+    cut = replace(whole, uv=uv, face_uv=np.where(whole.faces >= 0, halves, -1))
+    for name, body, count, wanted in (
+        ("Tongue", cut, 1, True),
+        ("Gum", cut, 1, False),
+        ("Tongue", cut, 2, False),
+        ("Tongue", squares((0.0, 0, 100.0, 0)), 1, False),
+    ):
+        mesh = joined(
+            [(name, replace(body, vertices=body.vertices + np.array([40.0 * k, 0.0, 0.0]))) for k in range(count)]
+        )
+        label, sizes = generic._pieces(mesh)
+        ((part, islands),) = generic._others(mesh, label, list(range(len(sizes))), 40_000.0, 1.0, [])
+        assert (part.wrapped, part.even) == (wanted, wanted)
+        assert not wanted or (len(islands) > 1 and part.request.points == 300)
+
+
 def test_others_get_points_by_their_share_of_the_skin() -> None:
     mesh = squares(*((300.0 * k, 0, 100.0, 0) for k in range(4)), names=("Tongue", "Gum", "Box", "Iris"))
     label, notes = np.arange(4), list[str]()

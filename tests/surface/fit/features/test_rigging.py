@@ -12,6 +12,7 @@ from surface.fit.features.rigging import (
     lid_share,
     lowered_tongue,
     make_groups,
+    take_tongue,
     tongue_groups,
 )
 from surface.fit.source.mesh import FitMesh
@@ -32,6 +33,23 @@ def test_the_jaw_is_found_from_its_teeth():
     found = find_jaw(mesh, {"jawOpen": [0]}, np.arange(40), np.array(JAW.centre))
     assert found.angle_rad == pytest.approx(JAW.angle_rad)
     np.testing.assert_allclose(found.glide, JAW.glide, atol=1e-9)
+
+
+@pytest.mark.parametrize(("share", "taken"), [(0.1, True), (0.3, True), (0.5, False), (1.0, False)])
+def test_a_tongue_that_the_jaw_leaves_behind_is_taken_along(share, taken):
+    turn, shift = jaw_path(JAW, 1.0)
+    whole = POINTS @ turn.T + shift - POINTS
+    chin, tongue, other = np.arange(20), np.arange(20, 35), np.arange(35, 40)
+    delta = whole * np.where(np.arange(40) < 20, 1.0, share)[:, None]
+    none = np.zeros((0, 4), np.int64)
+    mesh = FitMesh(POINTS, none, np.zeros((0, 2)), none, ("cheekPuff", "jawOpen"), np.stack([0.5 * delta, delta]))
+    made, notes = take_tongue(mesh, tongue, chin)
+    np.testing.assert_allclose(made.deltas[1][tongue], whole[tongue] * (1.0 if taken else share), atol=1e-9)
+    np.testing.assert_array_equal(made.deltas[1][other], delta[other])
+    np.testing.assert_array_equal(made.deltas[0], mesh.deltas[0])
+    assert bool(notes) is taken and (not taken or notes[0].startswith("jawOpen left the tongue behind, "))
+    for lacking in ((tongue, chin[:0]), (tongue[:0], chin)):
+        assert take_tongue(mesh, *lacking) == (mesh, [])
 
 
 def test_affine_fit_recovers_a_map():

@@ -35,6 +35,27 @@ def test_lips_that_touch_take_nothing_from_each_other(carried):
     assert tree.sum() > 100 and np.linalg.norm(moves[k][lower[tree]], axis=1).mean() < 0.05
 
 
+@pytest.mark.parametrize(("turned", "follows"), [(False, True), (True, False)])
+def test_skin_takes_nothing_from_skin_that_faces_the_other_way(turned, follows):
+    """A patch close behind the brow, which hangs on nothing: it moves as the brow does where it faces as that does."""
+    mesh, ids = part_mesh()
+    at, normals = mesh.vertices, vertex_normals(mesh)
+    brow = ids["face"][(np.abs(at[ids["face"]] - [15.0, 55.0, 100.0]) < [12.0, 8.0, 30.0]).all(axis=1)]
+    own = mesh.faces[np.isin(mesh.faces[:, :3], brow).all(axis=1)]
+    assert len(own) > 20 and normals[brow][:, 2].min() > 0.4
+    copy = np.full(len(at), -1)
+    used = np.unique(own[:, :3])
+    copy[used] = len(at) + np.arange(len(used))
+    patch = np.column_stack([copy[own[:, [0, 2, 1] if turned else [0, 1, 2]]], np.full(len(own), -1)])
+    faces, bare = np.concatenate([mesh.faces, patch]), np.full((len(mesh.faces) + len(patch), 4), -1)
+    more = {"vertices": np.concatenate([at, at[used] - normals[used]]), "faces": faces, "face_uv": bare}
+    more |= {"deltas": np.zeros((0, len(at) + len(used), 3)), "piece": np.append(mesh.piece, np.zeros(len(patch), int))}
+    (moves,) = Carrier(FitMesh(**(vars(mesh) | more)), shipped().head).moves(["browInnerUp"])
+    before, behind = np.linalg.norm(moves[used], axis=1), np.linalg.norm(moves[len(at) :], axis=1)
+    assert before.max() > 2.0
+    assert np.abs(behind - before).max() < 0.5 if follows else behind.max() < 1e-3
+
+
 def test_eyes_stay(carried):
     _, ids, moves = carried
     assert not moves[:, np.concatenate([ids["eye_left"], ids["eye_right"]])].any()

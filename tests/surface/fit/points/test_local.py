@@ -10,6 +10,7 @@ from small_head import small_head
 
 from surface import DCPSurface
 from surface.fit.points.local import MOVED_MM, OFF_MM, STILL_MM, localised
+from surface.fit.points.report import Localised
 from surface.head import Head
 from surface.head.model.data import Contact, Group, HeadData, PartData
 
@@ -62,7 +63,7 @@ def moved(data: HeadData, name: str = SHAPE) -> tuple[np.ndarray, np.ndarray]:
 def test_skin_that_hardly_moves_stays_and_other_skin_moves_as_before(scale: float) -> None:
     """On a head of twice the size everything is twice as far."""
     given = head_of([replace(spread(), moves=np.float32(scale) * spread().moves)])
-    made = localised(given, scale)
+    made, told = localised(given, scale)
     rest, before = moved(given)
     _, after = moved(made)
     size, off = np.linalg.norm(before, axis=1), np.linalg.norm(after - before, axis=1)
@@ -71,25 +72,27 @@ def test_skin_that_hardly_moves_stays_and_other_skin_moves_as_before(scale: floa
     assert (size[far] < STILL_MM * scale).all() and not after[far].any()
     (group,) = made.parts[0].groups
     assert len(group.ids) < 0.7 * N * N and group.moves.dtype == np.float32 and group.ids.dtype == np.int32
+    assert (told.before, told.after, told.shape, told.part, told.whole) == (N * N, len(group.ids), SHAPE, "a", {})
+    assert off.max() <= told.off_mm + 5e-3 * scale and told.off_mm < 1.3 * off.max()
 
 
 def test_what_moves_everywhere_and_groups_of_rules_stay_as_they_are() -> None:
     everywhere, fold = spread(floor=2 * MOVED_MM), spread("fold")
-    made = localised(head_of([everywhere, fold]), 1.0)
+    made, told = localised(head_of([everywhere, fold]), 1.0)
     assert np.array_equal(made.parts[0].groups[0].ids, everywhere.ids)
     np.testing.assert_allclose(made.parts[0].groups[0].moves, everywhere.moves)
-    assert made.parts[0].groups[1] is fold
+    assert made.parts[0].groups[1] is fold and told == Localised(N * N, N * N)  # of shapes, and nothing is off
 
 
 def test_a_group_that_moves_nothing_visible_is_left_out() -> None:
-    assert localised(head_of([replace(spread(), moves=0.001 * spread().moves)]), 1.0).parts[0].groups == []
+    assert localised(head_of([replace(spread(), moves=0.001 * spread().moves)]), 1.0)[0].parts[0].groups == []
 
 
 @pytest.mark.parametrize(("x", "quiet"), [(150.0, True), (70.0, False)])
 def test_a_contact_that_hardly_moves_is_left_alone(x: float, quiet: bool) -> None:
     """None of the points that its samples depend on moves, so that nothing of it is computed again."""
     contact = opening(x)
-    made = localised(head_of([spread()], [contact]), 1.0)
+    made, _ = localised(head_of([spread()], [contact]), 1.0)
     surface = Head(made).parts[0].surface
     near = np.flatnonzero(surface.basis_matrix(contact.places.reshape(-1, 2)).max(axis=0).toarray() > 0.01)
     assert (not np.isin(near, made.parts[0].groups[0].ids).any()) is quiet
@@ -98,4 +101,15 @@ def test_a_contact_that_hardly_moves_is_left_alone(x: float, quiet: bool) -> Non
 def test_a_group_that_would_be_off_stays(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("surface.fit.points.local.OFF_MM", 0.001)
     given = spread()
-    assert localised(head_of([given]), 1.0).parts[0].groups == [given]
+    made, told = localised(head_of([given]), 1.0)
+    assert made.parts[0].groups == [given] and told == Localised(N * N, N * N, whole={"a": [SHAPE]})
+
+
+def test_a_report_tells_it_in_words() -> None:
+    assert (
+        str(Localised(9, 9))
+        == "skin that a shape hardly moves stays: 0 of 9 displacements of control points are left out"
+    )
+    told = str(Localised(90, 30, 0.123, "jawOpen", "face", {"back": ["cheekPuff", "jawLeft"]}))
+    assert "60 of 90 displacements" in told and "by 0.12 mm at most: shape jawOpen (face)" in told
+    assert told.endswith("; kept whole: cheekPuff, jawLeft (back)")

@@ -46,6 +46,17 @@ def test_samples_are_mixes_of_vertices_on_the_skin(wrapped):
     assert np.abs(away - 1.0).max() < 0.02
 
 
+def test_even_rays_are_as_dense_at_the_rim_of_a_flat_tongue_as_on_its_back():
+    mesh, islands = body()
+    flat = mesh.vertices * [1.0, 0.2, 1.0]
+    widest = []
+    for even in (False, True):
+        chart = wrap_chart(FitMesh(**(vars(mesh) | {"vertices": flat})), islands, even=even)
+        ring = (chart.mix @ flat)[chart.uv[:, 0] == chart.uv[10 * 41, 0]]
+        widest.append(float(np.linalg.norm(np.diff(ring, axis=0), axis=1).max()))
+    assert len(ring) == 41 and widest[0] > 6.0 and widest[1] < 4.0, widest
+
+
 def test_the_surface_follows_the_skin_and_its_shape(wrapped):
     _, _, fit = wrapped
     assert np.sqrt((fit.error**2).mean()) < 0.5

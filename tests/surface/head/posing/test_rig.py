@@ -195,16 +195,19 @@ def test_what_rigid_parts_depend_on_is_named():
 
 
 @pytest.mark.parametrize(
-    ("lips", "name", "group", "wanted"),
+    ("lips", "name", "group", "material", "wanted"),
     [
-        (True, "tongue", "tongueOut", True), (True, "tongue", "jawOpen", False), (False, "tongue", "tongueOut", False),
-        (True, "", "tongueOut", False), (False, "tongue", "jawOpen", False),
+        (True, "tongue", "tongueOut", "tongue", True), (True, "tongue", "jawOpen", "tongue", False),
+        (False, "tongue", "tongueOut", "tongue", False), (True, "", "tongueOut", "tongue", False),
+        (False, "tongue", "jawOpen", "tongue", False), (True, "teeth", "tongueOut", "teeth", False),
+        (True, "lining", "tongueOut", "mouth", False),
     ],
 )  # fmt: skip
-def test_a_tongue_rests_on_lips_of_another_part(monkeypatch, lips, name, group, wanted):
+def test_a_tongue_rests_on_lips_of_another_part(monkeypatch, lips, name, group, material, wanted):
+    """Teeth, and what lines the mouth, move as a tongue comes out, too, for the jaw opens."""
     asked: list[str] = []
     monkeypatch.setattr(rig_module, "tongue_rest", lambda part, head: asked.append(part.name))
-    p = part(name, 0, groups=[all_points(group, (0, 0, 6))])
+    p = replace(part(name, 0, groups=[all_points(group, (0, 0, 6))]), material=material)
     for other, eye, counts in (("face", -1, True), ("face", 0, False), (name, -1, False)):
         asked.clear()
         contact = SimpleNamespace(eye=eye, part=other, followers=(), seal=None)
