@@ -73,6 +73,16 @@ def test_the_materials_own_colour_counts_and_what_is_clear_gets_the_colours_besi
     assert (edge[:, 0] > 0.08).all(), "the colour beside it, not a mean of all that is known"
 
 
+def test_an_opaque_material_shows_its_colours_whatever_the_textures_alpha_says() -> None:
+    found = []
+    for alpha in (0, 255):
+        mesh, island = sheet(Material(texture=ramp(alpha)))
+        (square,) = skin_squares(mesh, [SkinIslands("face", [island], False)], GREY)["face"]
+        assert square.known == 1.0
+        found.append(square.colour)
+    np.testing.assert_allclose(*found, atol=1e-6)
+
+
 def test_tiles_of_a_part_that_is_small_are_small_and_lie_where_its_islands_do() -> None:
     mesh, island = sheet(Material(texture=ramp()))
     low = replace(island, uv=0.25 * island.uv)

@@ -12,7 +12,7 @@ from eye_face import CENTRES, RADIUS, face, joined, pair, shell
 
 from surface.fit.eyes.search import Eyes
 from surface.fit.painting import texture as module
-from surface.fit.painting.skin import SkinIslands
+from surface.fit.painting.skin import SkinIslands, Square
 from surface.fit.painting.texture import MOST, STRIP, head_texture
 from surface.fit.source.islands import Island, find_islands
 from surface.fit.source.mesh import FitMesh
@@ -74,6 +74,17 @@ def test_rectangles_do_not_overlap_and_lie_inside() -> None:
         assert 0.0 <= left < right <= 1.0 and 0.0 < top < bottom <= 1.0
         for a, b, c, d in rows[:k]:
             assert right <= a or c <= left or bottom <= b or d <= top
+
+
+def test_a_square_of_a_tiles_corner_has_a_rectangle_as_if_the_tile_were_whole() -> None:
+    """So (u, v) of the part, which end at the corner's, lie in its square."""
+    ramp = np.repeat(np.linspace(0.0, 1.0, 64)[None, :, None], 64, axis=0) * np.ones(3)
+    texture = module.joined(
+        {"face": [Square(np.full((256, 256, 3), 0.3))], "ear": [Square(ramp, reach=0.25)]}, np.full(3, 0.3)
+    )
+    for u in (0.05, 0.125, 0.2):
+        (place,) = texture.places("ear", np.array([[u, 0.1]]))
+        np.testing.assert_allclose(linear(at(texture, place) / 255.0), u / 0.25, atol=0.03)
 
 
 def test_what_has_no_texture_is_left_to_paint_and_the_note_says_what_has_one() -> None:
