@@ -1,6 +1,5 @@
-"""Lay the textures of a mesh's skin and eyes, or the colours of a scan, out anew over the (u, v) of the head that is made
-from it.
+"""Lay textures of a mesh's skin and eyes, or the colours of a scan, out anew over the (u, v) of the head made from it.
 
-In: a mesh with its materials and the islands of the head's parts, or a head and the scan's colours. Out: one picture for
-the head. Imports base to dcp, head, fit.source, fit.eyes.
+In: a mesh with its materials and the islands of the head's parts, or a head and the colours of a scan. Out: one picture
+for the head. Imports base to dcp, head, fit.source, fit.eyes.
 """
