@@ -41,7 +41,8 @@ def texture_of(head: Head, part: HeadPart) -> Worn | None:
     if texture is None:
         return None
     if part.material == "eye":
-        return _eye(texture.picture, part) if "texture_rectangle" in part.attributes else None
+        shown = part.attributes.get("texture_rectangle")
+        return _eye(texture.picture, part) if shown is not None and shown.any() else None
     at = part.attributes.get("texture_uv")
     if at is None or part.name not in texture.tiles:
         return None

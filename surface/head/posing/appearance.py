@@ -61,7 +61,8 @@ def apply_look(parts: Iterable[HeadPart], look: Look, eyes: Floats) -> None:
                 part.attributes["freckles"] = look.freckles * _freckle_density(part, eyes)
         elif part.material == "eye" and look.iris is not None:
             part.attributes["iris"] = _fill_colour(part, look.iris)
-            part.attributes.pop("texture_rectangle", None)
+            if "texture_rectangle" in part.attributes:
+                part.attributes["texture_rectangle"] = np.zeros((len(part.vertices), 4), np.float32)
         elif part.material == "brow":
             if look.brow is not None:
                 part.attributes["albedo"] = _fill_colour(part, look.brow)
@@ -71,11 +72,11 @@ def apply_look(parts: Iterable[HeadPart], look: Look, eyes: Floats) -> None:
 def apply_texture(parts: Iterable[HeadPart], texture: HeadTexture) -> None:
     """Set the places in the texture, ``texture_uv`` (m, 2), of all parts: those that it does not draw lie where it
     leaves the skin as it is. An eye has the rectangle of its front instead, ``texture_rectangle`` (m, 4), alike for all
-    of it."""
+    of it; without an area where the texture does not draw it."""
     for part in parts:
         if part.material == "eye":
-            if part.name in texture.tiles:
-                part.attributes["texture_rectangle"] = np.tile(texture.tiles[part.name][0], (len(part.vertices), 1))
+            rows = texture.tiles.get(part.name, np.zeros((1, 4), np.float32))
+            part.attributes["texture_rectangle"] = np.tile(rows[0], (len(part.vertices), 1))
             continue
         part.attributes["texture_uv"] = texture.places(part.name, part.uv)
 

@@ -38,8 +38,6 @@ _INSIDE = "0.25"
 #: A baked sky without occlusion.
 _OPEN_SKY = (0.75, 0.5, 0.5, 0.5)
 _LOWER_LASHES = 0.42
-#: Rectangle of an eye without a texture.
-_NOWHERE = (0.0, 0.0, 0.0, 0.0)
 #: Half the width of a tongue's furrow, mm, and how much of the light it takes.
 _GROOVE_MM, _GROOVE = 2.2, 0.5
 #: Radius of an iris, in eyeball radii, and of its pupil, in radii of the iris.
@@ -239,9 +237,15 @@ def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[s
         "glow": theme.glow,
         "iris_radius": radius,
         "pupil_radius": _PUPIL * theme.pupil * radius,
-        "texture_rectangle": tuple(map(float, colours.get("texture_rectangle", _NOWHERE))),
         **openings.eye(part),
+        **_rectangle(colours),
     }
+
+
+def _rectangle(colours: Mapping[str, Any]) -> dict[str, Any]:
+    """Where an eye is in its head's texture, of heads that have one."""
+    own = colours.get("texture_rectangle")
+    return {} if own is None else {"texture_rectangle": tuple(map(float, own))}
 
 
 def _inner(

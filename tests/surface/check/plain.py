@@ -33,6 +33,7 @@ class PlainHead:
 
     parameters = NAMES
     accessories = ()
+    texture = None
 
     def __init__(self, parts: Sequence[SimpleNamespace], *, eyes: np.ndarray | None = EYES, radius: float = RADIUS,
                  jaw: float = 0.0) -> None:  # fmt: skip

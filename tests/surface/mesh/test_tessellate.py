@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from surface import DCPSurface, Domain, Slit
@@ -15,6 +15,7 @@ from tests.surface import shapes
 
 @settings(max_examples=12, deadline=None)
 @given(st.integers(0, 10_000), st.sampled_from([0.6, 0.2, 0.08]))
+@example(5562, 0.6)  # one border is a point but for some billionths
 def test_a_scattered_surface_is_covered_without_cracks(seed: int, error: float) -> None:
     surface = shapes.scattered(20, seed, degrees=(2, 5))
     mesh = surface.tessellate(chord_error=error, max_depth=6, domain=Domain((0, 1, 0, 1)))
@@ -23,7 +24,8 @@ def test_a_scattered_surface_is_covered_without_cracks(seed: int, error: float) 
     assert areas.min() > 0
     t, low, high = np.linspace(0, 1, 33), np.zeros(33), np.ones(33)
     sides = [np.stack(pair, axis=1) for pair in ((low, t), (high, t), (t, low), (t, high))]
-    pole = any(np.ptp(surface.evaluate(uv), axis=0).max() < 1e-12 for uv in sides)
+    near = 1e-9 * np.linalg.norm(np.ptp(surface.points, axis=0))  # what is nearer than this is one point
+    pole = any(np.ptp(surface.evaluate(uv), axis=0).max() < near for uv in sides)
     if pole:  # triangles without area are left out
         assert 0.8 < areas.sum() <= 1 + 1e-12
     else:

@@ -96,17 +96,16 @@ def test_a_texture_is_looked_up_where_its_coordinates_say_and_multiplied() -> No
 
 def test_large_pictures_are_made_smaller_and_far_too_large_ones_not_read(monkeypatch) -> None:
     data = picture(np.full((6, 40, 3), 255.0))
-    assert module._picture(data).shape == (6, 40, 4)
-    monkeypatch.setattr(module, "LARGEST", 20)
-    small = module._picture(data)
+    assert module.linear_picture(data).shape == (6, 40, 4)
+    small = module.linear_picture(data, 20)
     assert small.shape == (3, 20, 4)
     np.testing.assert_allclose(small, 1.0)
     monkeypatch.setattr(module, "MOST_PIXELS", 239)
-    assert module._picture(data) is None
+    assert module.linear_picture(data) is None
     monkeypatch.setattr(module, "MOST_PIXELS", 240)
-    assert module._picture(data) is not None
+    assert module.linear_picture(data) is not None
     for cut in (data[:40], b""):
-        assert module._picture(cut) is None
+        assert module.linear_picture(cut) is None
 
 
 def test_srgb_becomes_linear_as_its_standard_says() -> None:
