@@ -56,7 +56,7 @@ def _eye(picture: bytes, part: HeadPart) -> Worn | None:
     except (ImportError, ValueError):
         return None
     rectangle = np.asarray(part.attributes["texture_rectangle"][0], float) * (*image.size, *image.size)
-    left, top, right, bottom = np.rint(rectangle + np.array([-0.5, -0.5, 0.5, 0.5])).astype(int).tolist()
+    left, top, right, bottom = np.rint(rectangle).astype(int).tolist()
     out = io.BytesIO()
     image.crop((left, top, right, bottom)).save(out, "PNG", optimize=True)
     rest = part.mesh.vertices

@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from surface.base.arrays import Bools, Floats
 from surface.fit.painting.raster import covering
-from surface.fit.painting.skin import Square
+from surface.fit.painting.skin import Square, room_for
 from surface.fit.painting.texture import joined
 from surface.fit.source.textures import Samples
 from surface.head import Head, HeadData, HeadPart
@@ -66,10 +66,12 @@ def _on_eyes(data: HeadData, points: Floats) -> Bools:
     return on
 
 
-def _square(part: HeadPart, side: int, tree: cKDTree, rgb: Floats, tone: Floats) -> Square:
+def _square(part: HeadPart, scale: int, tree: cKDTree, rgb: Floats, tone: Floats) -> Square:
     """The picture of a part over (u, v); where the scan has nothing, the skin's own tone."""
     vertices, triangles = part.vertices.astype(float), part.triangles
-    owner, share = covering(np.ascontiguousarray(side * part.uv.astype(float)[triangles]), side, side)
+    places = scale * part.uv.astype(float)[triangles]
+    origin, side = room_for(places)
+    owner, share = covering(np.ascontiguousarray(places + origin), side, side)
     seen = owner >= 0
     at = np.einsum("mk,mkx->mx", share[seen], vertices[triangles[owner[seen]]])
     off, near = tree.query(at, k=NEIGHBOURS, distance_upper_bound=NEAR_MM, workers=-1)
@@ -80,10 +82,10 @@ def _square(part: HeadPart, side: int, tree: cKDTree, rgb: Floats, tone: Floats)
     known[seen] = total > 0.0
     colour[seen] = (mean / np.maximum(total, 1e-9)[:, None]) ** 2
     if not known.any():
-        return Square(np.tile(tone, (side, side, 1)), known=0.0)
+        return Square(np.tile(tone, (side, side, 1)), scale, origin, 0.0)
     beside, (y, x) = distance_transform_edt(~known, return_indices=True)
     own = smoothstep(beside, *BESIDE)[..., None]
-    return Square((1.0 - own) * colour[y, x] + own * tone, known=float(known[seen].mean()))
+    return Square((1.0 - own) * colour[y, x] + own * tone, scale, origin, float(known[seen].mean()))
 
 
 def _painted(data: HeadData, texture: HeadTexture, tone: Floats) -> HeadData:

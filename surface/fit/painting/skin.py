@@ -19,9 +19,8 @@ SIDES = 2048, 1024, 512
 """Texels along a tile of the first part, which is the face: as few as its texture has, but not fewer than the last but
 one, unless the whole becomes too large."""
 OTHERS = 0.5  # of that, texels along tiles of other parts
-BLOCK = 8  # texels of a side of a JPEG's blocks, which no two tiles share
-FEWEST = 32  # texels along the smallest tile
-LEAST = 0.2  # of a tile of the face that must have colours from a texture
+BLOCK = 8  # texels of a side of a JPEG's blocks, which no two tiles share; as many lie around what is shown
+LEAST = 0.2  # of the face's picture that must have colours from a texture
 OPAQUE = 0.5  # opacity from which on a texel's colour is the skin's
 
 
@@ -37,15 +36,25 @@ class SkinIslands:
 
 @dataclass(frozen=True)
 class Square:
-    """A picture of a tile of (u, v), or of the corner of it that an island covers.
+    """A picture of what an island covers of its tile of (u, v).
 
-    colour : (side, side, 3) linear RGB, from the left to the right and from the top down, where v is 0.
-    reach : share of the tile's width and height that it shows. known : share of it that has a colour of a texture.
+    colour : (side, side, 3) linear RGB, u runs to the right and v down. scale : texels along one unit of (u, v).
+    origin : (2,) texels from its left and top to where the tile begins. known : share of it that has a colour of a
+    texture.
     """
 
     colour: Floats
-    reach: float = 1.0
+    scale: float
+    origin: Floats
     known: float = 1.0
+
+
+def room_for(at: Floats) -> tuple[Floats, int]:
+    """Where (2,) the origin of places ``at`` (t, 3, 2), in texels, is in a picture that has room for all of them with
+    a block around, and how many texels a side of that has."""
+    low = BLOCK * np.floor(at.min(axis=(0, 1)) / BLOCK) - BLOCK
+    side = BLOCK * np.ceil((at.max(axis=(0, 1)) - low).max() / BLOCK) + BLOCK
+    return -low, int(side)
 
 
 def skin_squares(
@@ -94,20 +103,20 @@ def _areas(corner: Floats) -> Floats:
 
 
 def _square(
-    mesh: FitMesh, part: SkinIslands, k: int, numbers: FaceNumbers, side: int, colour: Floats
+    mesh: FitMesh, part: SkinIslands, k: int, numbers: FaceNumbers, scale: int, colour: Floats
 ) -> Square:  # fmt: skip
-    """One tile, of which the whole would have ``side`` texels. Beside its island, and where its texture is clear, it
-    has the colours that are nearest."""
+    """One tile, of which a whole one would have ``scale`` texels to a side. Beside its island, and where its texture is
+    clear, it has the colours that are nearest."""
     island = _placed(part, k)
     own = faces_of(island, numbers)
     rows, faces = texture_corners(mesh, island, own), own[face_of_triangles(island.faces)]
-    at = (island.uv[triangles(island.faces)] - [TILE * k, 0.0]) * side
-    whole, side = side, int(np.clip(BLOCK * np.ceil(at.max() / BLOCK), FEWEST, side))
-    owner, share = covering(np.ascontiguousarray(at), side, side)
+    at = (island.uv[triangles(island.faces)] - [TILE * k, 0.0]) * scale
+    origin, side = room_for(at)
+    owner, share = covering(np.ascontiguousarray(at + origin), side, side)
     seen = owner >= 0
     rgba = np.zeros((side, side, 4))
     rgba[seen] = looked_up(mesh, faces[owner[seen]], rows[owner[seen]], share[seen])
     known = rgba[..., 3] >= OPAQUE
     if not known.any():
-        return Square(np.tile(colour, (side, side, 1)), side / whole, 0.0)
-    return Square(spread(rgba[..., :3], known), side / whole, float(known.mean()))
+        return Square(np.tile(colour, (side, side, 1)), scale, origin, 0.0)
+    return Square(spread(rgba[..., :3], known), scale, origin, float(known.mean()))

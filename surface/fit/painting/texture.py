@@ -32,7 +32,7 @@ def head_texture(mesh: FitMesh, eyes: Eyes, parts: Sequence[SkinIslands]) -> tup
         return None, []
     found = skin_colour(mesh, eyes.skin)
     tone = np.array(PLAIN) if found is None else found
-    fronts = {name: [Square(p)] for name, p in zip(EYES, eye_pictures(mesh, eyes), strict=True) if p is not None}
+    fronts = {name: [_front(p)] for name, p in zip(EYES, eye_pictures(mesh, eyes), strict=True) if p is not None}
     for largest in SIDES:
         skin = skin_squares(mesh, parts, tone, largest) if found is not None else {}
         squares = skin | fronts
@@ -47,6 +47,11 @@ def head_texture(mesh: FitMesh, eyes: Eyes, parts: Sequence[SkinIslands]) -> tup
     return joined(squares, tone), [f"{what} drawn with the mesh's own texture"]
 
 
+def _front(picture: Floats) -> Square:
+    """An eye's picture, whose (u, v) run from its left and top to its right and bottom."""
+    return Square(picture, float(len(picture)), np.zeros(2))
+
+
 def joined(squares: Mapping[str, Sequence[Square]], tone: Floats) -> HeadTexture:
     """The texture of squares by part. tone : (3,) linear RGB of a texel that leaves the skin as it is painted."""
     picture, rectangles = _laid_out([square for own in squares.values() for square in own], tone)
@@ -58,16 +63,15 @@ def joined(squares: Mapping[str, Sequence[Square]], tone: Floats) -> HeadTexture
 
 def _laid_out(squares: Sequence[Square], tone: Floats) -> tuple[Floats, Floats32]:
     """A picture (h, w, 3) of all squares, in columns below a strip of ``tone``; and the rectangle (k, 4) of the
-    tile of each, half a texel inside its border, so that none shows another."""
+    tile of each."""
     places, width, height = _places([len(square.colour) for square in squares])
     picture = np.tile(np.clip(tone, 0.0, 1.0), (height, width, 1))
     rectangles = np.zeros((len(squares), 4), np.float32)
     for k, ((x, y), square) in enumerate(zip(places, squares, strict=True)):
         side = len(square.colour)
         picture[y : y + side, x : x + side] = square.colour
-        whole = (side - 1) / square.reach
-        edges = np.array([x + 0.5, y + 0.5, x + 0.5 + whole, y + 0.5 + whole])
-        rectangles[k] = edges / [width, height, width, height]
+        first = square.origin + np.array([x, y])
+        rectangles[k] = np.concatenate([first, first + square.scale]) / [width, height, width, height]
     return np.clip(picture, 0.0, 1.0), rectangles
 
 

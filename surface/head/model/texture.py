@@ -21,6 +21,7 @@ FILE = "texture.npz"
 PICTURE, COLOUR, TILES = "picture", "colour", "tiles/"
 TILE = 2.0
 """Distance in u between two tiles of a part, whose own (u, v) are 0 to 1."""
+BESIDE = 0.5  # half of the gap between two tiles: what rounding puts beside one is not in the next
 LARGE = 1e3  # no rectangle reaches further, in pictures
 HINT = "delete the file, and skin and irises are drawn in one colour, or make the head again: omote fit"
 
@@ -33,7 +34,7 @@ class HeadTexture:
     colour : linear RGB of a texel that leaves the skin as it is painted: others change it by their ratio to this one,
         so that a person's own tone of skin keeps what the texture draws on it.
     tiles : (k, 4) by part, one row for an eye, left, top, right and bottom of each tile's rectangle, 0..1 to the right
-        and down, as v runs. It may reach beyond the picture where a part covers only a corner of the tile.
+        and down, as v runs. It may reach beyond the picture, and a part beyond it: some have (u, v) beside the tile.
     """
 
     picture: bytes
@@ -47,10 +48,10 @@ class HeadTexture:
         if rows is None:
             return np.zeros((len(uv), 2), np.float32)
         at = np.asarray(uv, np.float64)
-        tile = np.clip(np.floor(at[:, 0] / TILE), 0, len(rows) - 1).astype(int)
-        across, down = np.clip(at[:, 0] - TILE * tile, 0.0, 1.0), np.clip(at[:, 1], 0.0, 1.0)
+        tile = np.clip(np.floor((at[:, 0] + BESIDE) / TILE), 0, len(rows) - 1).astype(int)
         left, top, right, bottom = rows[tile].T
-        return np.column_stack([left + across * (right - left), top + down * (bottom - top)]).astype(np.float32)
+        across = left + (at[:, 0] - TILE * tile) * (right - left)
+        return np.column_stack([across, top + at[:, 1] * (bottom - top)]).astype(np.float32)
 
 
 def read_texture(head: str | Path) -> HeadTexture | None:

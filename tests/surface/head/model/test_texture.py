@@ -33,9 +33,11 @@ def test_it_comes_back_and_goes_with_the_head_that_has_none(tmp_path: Path) -> N
 
 
 def test_places_are_in_the_rectangle_of_the_tile_from_its_top_on() -> None:
-    uv = np.array([[0.0, 0.0], [1.0, 1.0], [0.5, 0.25], [TILE, 0.0], [TILE + 1.0, 1.0], [-0.1, 1.2], [9.0, 0.0]])
-    wanted = [[0.1, 0.2], [0.5, 0.8], [0.3, 0.35], [0.6, 0.0], [0.7, 1.5], [0.1, 0.8], [0.7, 0.0]]
+    uv = np.array([[0.0, 0.0], [1.0, 1.0], [0.5, 0.25], [TILE, 0.0], [TILE + 1.0, 1.0], [-0.1, 1.2], [1.4, 0.0]])
+    wanted = [[0.1, 0.2], [0.5, 0.8], [0.3, 0.35], [0.6, 0.0], [0.7, 1.5], [0.06, 0.92], [0.66, 0.2]]
     np.testing.assert_allclose(TEXTURE.places("a", uv), wanted, atol=1e-6)
+    beside = TEXTURE.places("a", np.array([[TILE - 1e-6, 0.0], [TILE + 1.0 + 1e-6, 1.0]], np.float32))
+    np.testing.assert_allclose(beside, [[0.6, 0.0], [0.7, 1.5]], atol=1e-5, err_msg="rounded, not in another tile")
     assert TEXTURE.places("a", uv).dtype == np.float32
     np.testing.assert_array_equal(TEXTURE.places("other", uv), np.zeros((7, 2)))
 
