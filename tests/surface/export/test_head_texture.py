@@ -104,3 +104,5 @@ def test_files_for_pages_have_it_too(tmp_path: Path) -> None:
     assert v.max() <= 0.5 + 1e-5 and u.min() >= 0.0 and u.max() <= 1.0
     with_picture = [m.visual.material.baseColorTexture is not None for m in scene.geometry.values()]
     assert sorted(with_picture) == [False, True, True]
+    u, v = np.asarray(mesh_of(scene, "eye_left").visual.uv, float).T
+    assert u.min() == pytest.approx(0.0, abs=1e-3) and u.max() == pytest.approx(1.0, abs=1e-3)

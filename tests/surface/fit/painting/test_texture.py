@@ -88,6 +88,11 @@ def test_a_square_of_a_tiles_corner_has_a_rectangle_as_if_the_tile_were_whole() 
         np.testing.assert_allclose(linear(at(texture, place) / 255.0), (256.0 * u + 8.0) / 64.0, atol=0.03)
 
 
+def test_the_first_texel_has_the_tone_whatever_is_painted_below() -> None:
+    texture = module.joined({"face": [Square(np.full((64, 64, 3), 0.8), 64.0, np.zeros(2))]}, np.full(3, 0.1))
+    np.testing.assert_allclose(linear(picture(texture)[: STRIP // 2, : STRIP // 2] / 255.0), 0.1, atol=0.01)
+
+
 def test_what_has_no_texture_is_left_to_paint_and_the_note_says_what_has_one() -> None:
     texture, notes, *_ = made(Material(colour=(0.5, 0.3, 0.2, 1.0)), material(BROWN), material(GREEN))
     assert texture is not None and set(texture.tiles) == {"eye_left", "eye_right"}

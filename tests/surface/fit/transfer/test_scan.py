@@ -174,3 +174,16 @@ def test_too_many_vertices_are_refused(monkeypatch):
     for faces in (TWO - 1, TWO + 1):
         with pytest.raises(FitError, match="a vertex that is not there"):
             make_scan(SQUARE, faces, "x")
+
+
+def test_colours_of_eyes_are_apart_from_those_of_skin(tmp_path):
+    """Skin that closes over an eye must not have the eye's colour."""
+    path = tmp_path / "scan.obj"
+    red, green = "0.8 0.2 0.2", "0.1 0.8 0.1"
+    skin = [f"v {x} {y} 0 {red}" for x, y in ((0, 0), (100, 0), (0, 100))]
+    eye = [f"v {x} {y} 5 {green}" for x, y in ((10, 10), (30, 10), (10, 30))]
+    path.write_text("\n".join(["o Head", *skin, "f 1 2 3", "o EyeLeft", *eye, "f 4 5 6"]) + "\n")
+    scan = read_scan(path)
+    assert scan.colours is not None and scan.eye_colours is not None
+    assert (scan.colours.colour[:, 0] > scan.colours.colour[:, 1]).all()
+    assert (scan.eye_colours.colour[:, 0] < scan.eye_colours.colour[:, 1]).all()
