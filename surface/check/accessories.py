@@ -15,19 +15,15 @@ OWN_HINT = f"fit the head again, or delete {{folder}}/{FILE}, and skin and irise
 
 def damaged_textures(head: Head) -> Iterator[Finding]:
     """Find textures that are damaged or too large; none without Pillow, which draws them."""
+    worn = (one.accessory for one in head.accessories)
+    pictures = [(own.texture, f"{own.kind} {own.name!r} is", "its", HINT) for own in worn]
     if head.texture is not None:
+        pictures.insert(0, (head.texture.picture, "skin and eyes are", "their", OWN_HINT))
+    for data, what, whose, hint in pictures:
         try:
-            decoded(head.texture.picture)
+            if data:
+                decoded(data)
         except ImportError:
             return
         except ValueError as error:
-            yield Finding("damaged texture", f"skin and eyes are drawn without their texture: {error}", OWN_HINT)
-    for worn in head.accessories:
-        own = worn.accessory
-        try:
-            if own.texture:
-                decoded(own.texture)
-        except ImportError:
-            return
-        except ValueError as error:
-            yield Finding("damaged texture", f"{own.kind} {own.name!r} is drawn without its texture: {error}", HINT)
+            yield Finding("damaged texture", f"{what} drawn without {whose} texture: {error}", hint)

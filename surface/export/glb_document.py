@@ -10,16 +10,15 @@ import numpy as np
 
 from surface.base.arrays import Array, Floats32
 from surface.export.glb_buffers import ARRAY_BUFFER, ELEMENT_BUFFER, FLOAT, UINT, GlbBuffers
-from surface.export.head_texture import SAMPLER
 from surface.export.shapes import ExportPart
 from surface.export.textures import eye_column, materials, png_bytes
-from surface.export.worn import material_of, sampler_of
+from surface.export.worn import CLAMP, LINEAR, MIPMAPS, REPEAT, material_of, sampler_of
 from surface.head import Head
 from surface.head.model.accessories import Accessory
 
 METRES = np.float32(0.001)
-NEAREST, REPEAT, CLAMP_TO_EDGE = 9729, 10497, 33071
-EYE_SAMPLER = {"magFilter": NEAREST, "minFilter": NEAREST, "wrapS": REPEAT, "wrapT": CLAMP_TO_EDGE}
+EYE_SAMPLER = {"magFilter": LINEAR, "minFilter": LINEAR, "wrapS": REPEAT, "wrapT": CLAMP}
+TEXTURE_SAMPLER = {"magFilter": LINEAR, "minFilter": MIPMAPS, "wrapS": CLAMP, "wrapT": CLAMP}
 SPARSE = 0.5  # targets that move less than this share of a part's vertices are kept as sparse accessors
 
 
@@ -112,7 +111,7 @@ class Document(GlbBuffers):
         """Return the index of a part's texture: that of its head, or one that is drawn here of an eye; None without."""
         own = part.texture
         if own is not None:
-            return self._texture(own.picture, own.mime, part.material, SAMPLER)
+            return self._texture(own.picture, own.mime, part.material, TEXTURE_SAMPLER)
         if "texture" not in table:
             return None
         return self._texture(png_bytes(eye_column(part)), "image/png", "eye", EYE_SAMPLER)

@@ -10,14 +10,11 @@ import numpy as np
 from surface.base.arrays import Floats32
 from surface.base.pictures import decoded
 from surface.head import Head
-from surface.head.model.accessories import PICTURES
 from surface.head.posing.part import HeadPart
-
-CLAMP, LINEAR, MIPMAPS = 33071, 9729, 9987  # glTF's numbers
-SAMPLER = {"magFilter": LINEAR, "minFilter": MIPMAPS, "wrapS": CLAMP, "wrapT": CLAMP}
+from surface.readers.meshdata import kind_of_picture
 
 
-class Worn(NamedTuple):
+class ShownTexture(NamedTuple):
     """What a part shows of its head's texture.
 
     picture : a whole PNG or JPEG file. uv : (m, 2) places in it, v up. tone : linear RGB of a texel that leaves the
@@ -31,10 +28,10 @@ class Worn(NamedTuple):
     @property
     def mime(self) -> str:
         """The picture's kind, as ``image/png``."""
-        return next(kind for start, kind in PICTURES.items() if self.picture.startswith(start))
+        return kind_of_picture(self.picture)
 
 
-def texture_of(head: Head, part: HeadPart) -> Worn | None:
+def texture_of(head: Head, part: HeadPart) -> ShownTexture | None:
     """Return what a part shows of its head's texture; None where it has none of its own, or, of an eye, where Pillow is
     missing or the picture cannot be read."""
     texture = head.texture
@@ -46,10 +43,10 @@ def texture_of(head: Head, part: HeadPart) -> Worn | None:
     at = part.attributes.get("texture_uv")
     if at is None or part.name not in texture.tiles:
         return None
-    return Worn(texture.picture, (at * [1, -1] + [0, 1]).astype(np.float32), texture.colour)
+    return ShownTexture(texture.picture, (at * [1, -1] + [0, 1]).astype(np.float32), texture.colour)
 
 
-def _eye(picture: bytes, part: HeadPart) -> Worn | None:
+def _eye(picture: bytes, part: HeadPart) -> ShownTexture | None:
     """The rectangle of an eye, and its vertices as they lie in it, at rest and seen from the front."""
     try:
         image = decoded(picture).convert("RGB")
@@ -62,12 +59,12 @@ def _eye(picture: bytes, part: HeadPart) -> Worn | None:
     rest = part.mesh.vertices
     local = (rest - 0.5 * (rest.min(axis=0) + rest.max(axis=0)))[:, :2]
     across = np.abs(local).max()
-    return Worn(out.getvalue(), (0.5 + 0.5 * local / across).astype(np.float32), None)
+    return ShownTexture(out.getvalue(), (0.5 + 0.5 * local / across).astype(np.float32), None)
 
 
-def tinted(albedo: Floats32, worn: Worn | None) -> Floats32:
+def tinted(albedo: Floats32, shown: ShownTexture | None) -> Floats32:
     """Return colours (m, 3) by which a part's texture is multiplied, so that what is drawn is as ``albedo`` says."""
-    if worn is None or worn.tone is None:
+    if shown is None or shown.tone is None:
         return albedo
-    ratio: Floats32 = (albedo / np.array(worn.tone)).astype(np.float32)
+    ratio: Floats32 = (albedo / np.array(shown.tone)).astype(np.float32)
     return ratio

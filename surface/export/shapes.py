@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from surface.base.arrays import Floats, Floats32, Ints
-from surface.export.head_texture import Worn, texture_of, tinted
+from surface.export.head_texture import ShownTexture, texture_of, tinted
 from surface.head import Head
 from surface.head.model.accessories import Accessory
 from surface.head.model.parameters import SHAPES, TONGUE_JAW
@@ -47,7 +47,7 @@ class ExportPart:
     normal_changes: dict[str, Floats32] = field(default_factory=dict)
     painted: dict[str, Floats32] = field(default_factory=dict)
     worn: Accessory | None = None
-    texture: Worn | None = None
+    texture: ShownTexture | None = None
 
 
 def export_parts(head: Head, pose: Mapping[str, float] | None = None, *, shapes: bool = True) -> list[ExportPart]:

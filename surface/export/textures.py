@@ -15,6 +15,7 @@ from surface.base import files
 from surface.base.arrays import Floats
 from surface.export.shapes import ExportPart
 from surface.head.model.parameters import smoothstep
+from surface.readers.meshdata import linear, srgb
 
 Picture = NDArray[np.uint8]
 #: Threshold of the alpha test of strands.
@@ -45,16 +46,9 @@ def png_bytes(picture: Picture) -> bytes:
     return out
 
 
-def encode_srgb(linear: Floats) -> Picture:
-    """Return linear colours 0..1 as sRGB bytes (IEC 61966-2-1)."""
-    c = np.clip(linear, 0.0, 1.0)
-    curve = np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
-    return np.rint(255.0 * curve).astype(np.uint8)
-
-
-def decode_srgb(srgb: Floats) -> Floats:
-    """Return sRGB colours 0..1 as linear ones."""
-    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+def encode_srgb(intensity: Floats) -> Picture:
+    """Return linear colours 0..1 as sRGB bytes."""
+    return np.rint(255.0 * srgb(np.clip(intensity, 0.0, 1.0))).astype(np.uint8)
 
 
 def eye_column(part: ExportPart) -> Picture:
@@ -64,7 +58,7 @@ def eye_column(part: ExportPart) -> Picture:
     for k, stop in enumerate(stops):
         wanted = part.painted.get(stop.get("of", ""))
         if wanted is not None:
-            share = decode_srgb(colours[k]) * np.asarray(wanted, float) / np.array(plain[stop["of"]])
+            share = linear(colours[k]) * np.asarray(wanted, float) / np.array(plain[stop["of"]])
             colours[k] = encode_srgb(share) / 255.0
     v = 1.0 - (np.arange(256) + 0.5) / 256
     column = np.stack([np.interp(v, [stop["v"] for stop in stops], colours[:, k]) for k in range(3)], axis=1)

@@ -26,10 +26,10 @@ def eye_pictures(mesh: FitMesh, eyes: Eyes) -> list[Floats | None]:
     if eyes.radius <= 0.0:
         return [None, None]
     sides = zip(faces_by_side(mesh, eyes), eyes.centres, strict=True)
-    return [_picture(mesh, _worn(mesh, ids), centre, eyes.radius) for ids, centre in sides]
+    return [_picture(mesh, _coloured(mesh, ids), centre, eyes.radius) for ids, centre in sides]
 
 
-def _worn(mesh: FitMesh, faces: Ints) -> Ints:
+def _coloured(mesh: FitMesh, faces: Ints) -> Ints:
     """Those of the faces of an eye that give it colours: no cornea, no highlight, nothing without a texture."""
     names = [mesh.piece_of(int(f)) for f in faces]
     own = np.array([is_iris(name) or not is_cover(name) for name in names], bool)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from surface.base.arrays import Floats
+from surface.base.arrays import Floats, Ints
 from surface.fit.painting.lookup import looked_up, pixels_of, spread
 from surface.fit.painting.raster import covering
 from surface.fit.source.chart import in_tile
@@ -81,11 +81,16 @@ def _placed(part: SkinIslands, k: int) -> Island:
     return in_tile(part.islands[k], k) if part.tiled else part.islands[k]
 
 
+def _sources(mesh: FitMesh, island: Island, numbers: FaceNumbers) -> tuple[Ints, Ints]:
+    """Of each of an island's triangles the mesh's face (t,), -1 without one, and rows (t, 3) of ``mesh.uv``."""
+    own = faces_of(island, numbers)
+    return own[face_of_triangles(island.faces)], texture_corners(mesh, island, own)
+
+
 def _density(mesh: FitMesh, island: Island, numbers: FaceNumbers) -> float:
     """How many pixels of its textures lie along one unit of an island's (u, v): the median of its triangles; 0 without
     a texture that can be read."""
-    own = faces_of(island, numbers)
-    rows, faces = texture_corners(mesh, island, own), own[face_of_triangles(island.faces)]
+    faces, rows = _sources(mesh, island, numbers)
     known = (faces >= 0) & (rows >= 0).all(axis=1)
     if not known.any():
         return 0.0
@@ -108,8 +113,7 @@ def _square(
     """One tile, of which a whole one would have ``scale`` texels to a side. Beside its island, and where its texture is
     clear, it has the colours that are nearest."""
     island = _placed(part, k)
-    own = faces_of(island, numbers)
-    rows, faces = texture_corners(mesh, island, own), own[face_of_triangles(island.faces)]
+    faces, rows = _sources(mesh, island, numbers)
     at = (island.uv[triangles(island.faces)] - [TILE * k, 0.0]) * scale
     origin, side = room_for(at)
     owner, share = covering(np.ascontiguousarray(at + origin), side, side)

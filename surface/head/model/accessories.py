@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from surface.base.arrays import Array, Floats32
 from surface.base.errors import HeadFileError
-from surface.head.model.sidecar import DAMAGED, Sidecar, read_sidecar, reason, sidecar_path, write_sidecar
+from surface.head.model.sidecar import DAMAGED, Sidecar, numbers, read_sidecar, reason, sidecar_path, write_sidecar
 
 FILE = "accessories.npz"
 KINDS = ("hair", "hat", "glasses", "jewellery")
@@ -123,8 +123,8 @@ def _unpack(file: Sidecar) -> tuple[Accessory, ...]:
     z = file.arrays
     names, kinds, alphas = (_words(z, key) for key in TABLES[:3])
     count = len(names)
-    colours, cutoffs = (_numbers(z, key, shape) for key, shape in (("colours", (count, 4)), ("cutoffs", (count,))))
-    two_sided = _numbers(z, "two_sided", (count,))
+    colours = numbers(z, "colours", (count, 4), LARGE_MM)
+    cutoffs, two_sided = (numbers(z, key, (count,), LARGE_MM) for key in ("cutoffs", "two_sided"))
     for key, words, known in (("kinds", kinds, KINDS), ("alphas", alphas, ALPHA)):
         if len(words) != count or not set(words) <= set(known):
             raise ValueError(f"{key} is no list of {count} of {', '.join(known)}")
@@ -154,27 +154,17 @@ def _words(arrays: Mapping[str, Array], key: str) -> list[str]:
     return [str(word) for word in words]
 
 
-def _numbers(arrays: Mapping[str, Array], key: str, shape: tuple[int, ...]) -> Floats32:
-    """Return finite numbers; -1 in the shape is any length."""
-    found = arrays[key]
-    if found.ndim != len(shape) or any(w not in (-1, g) for g, w in zip(found.shape, shape, strict=True)):
-        raise ValueError(f"{key} has shape {found.shape}, expected {shape}".replace("-1", "any"))
-    if found.dtype.kind not in "fiu" or not (np.abs(found) < LARGE_MM).all():
-        raise ValueError(f"{key} holds what is no number of usable size")
-    return np.ascontiguousarray(found, np.float32)
-
-
 def _mesh(arrays: Mapping[str, Array], k: int) -> tuple[Floats32, Floats32, Floats32, NDArray[np.int32], Floats32]:
     """Return vertices, normals, texture coordinates, triangles and shade of one accessory."""
-    vertices = _numbers(arrays, f"{k}/vertices", (-1, 3))
+    vertices = numbers(arrays, f"{k}/vertices", (-1, 3), LARGE_MM)
     m = len(vertices)
     if m > MAX_VERTICES:
         raise ValueError(f"{k}/vertices holds {m} vertices, {MAX_VERTICES} are the most")
-    normals, uv = _numbers(arrays, f"{k}/normals", (m, 3)), _numbers(arrays, f"{k}/uv", (m, 2))
+    normals, uv = numbers(arrays, f"{k}/normals", (m, 3), LARGE_MM), numbers(arrays, f"{k}/uv", (m, 2), LARGE_MM)
     triangles = _triangles(arrays, f"{k}/triangles", m, MAX_TRIANGLES)
     if not len(triangles):
         raise ValueError(f"{k}/triangles is empty")
-    return vertices, normals, uv, triangles, _numbers(arrays, f"{k}/shade", (m,))
+    return vertices, normals, uv, triangles, numbers(arrays, f"{k}/shade", (m,), LARGE_MM)
 
 
 def _outside(arrays: Mapping[str, Array], k: int) -> NDArray[np.int32] | None:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from surface.base.arrays import Array
+from surface.base.arrays import Array, Floats32
 from surface.base.errors import HeadFileError
 from surface.base.files import read_npz, reading
 
@@ -54,6 +54,19 @@ def read_sidecar(path: Path, make: Callable[[Sidecar], Made], hint: str) -> Made
         return make(Sidecar(path, {k: v for k, v in every.items() if not k.startswith(META)}, checks))
     except DAMAGED as error:
         raise HeadFileError(f"{path}: {reason(error)}", hint=hint) from error
+
+
+def numbers(arrays: Mapping[str, Array], key: str, shape: tuple[int, ...], most: float) -> Floats32:
+    """Return the numbers of an array; -1 in the ``shape`` is any length. ``most`` : none is as large, either way.
+
+    Raises KeyError: there is no such array. ValueError: it has another shape, or holds what is no such number.
+    """
+    found = arrays[key]
+    if found.ndim != len(shape) or any(w not in (-1, g) for g, w in zip(found.shape, shape, strict=True)):
+        raise ValueError(f"{key} has shape {found.shape}, expected {shape}".replace("-1", "any"))
+    if found.dtype.kind not in "fiu" or not (np.abs(found) < most).all():
+        raise ValueError(f"{key} holds what is no number of usable size")
+    return np.ascontiguousarray(found, np.float32)
 
 
 def reason(error: Exception) -> str:

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
-from surface.base.arrays import Array, Floats, Floats32
+from surface.base.arrays import Array, Floats32
 from surface.head.model.accessories import PICTURES
-from surface.head.model.sidecar import Sidecar, read_sidecar, sidecar_path, write_sidecar
+from surface.head.model.sidecar import Sidecar, numbers, read_sidecar, sidecar_path, write_sidecar
 
 FILE = "texture.npz"
 PICTURE, COLOUR, TILES = "picture", "colour", "tiles/"
@@ -76,24 +76,14 @@ def write_texture(head: str | Path, texture: HeadTexture | None) -> Path | None:
 
 def _unpack(file: Sidecar) -> HeadTexture:
     """Return the texture of a file. Raises ValueError or KeyError: it is damaged."""
-    picture, colour = file.arrays[PICTURE], _finite(file.arrays, COLOUR, (3,))
+    picture, colour = file.arrays[PICTURE], numbers(file.arrays, COLOUR, (3,), LARGE)
     if picture.ndim != 1 or picture.dtype != np.uint8 or not picture.tobytes().startswith(tuple(PICTURES)):
         raise ValueError(f"{PICTURE} is neither PNG nor JPEG")
     if not ((colour > 0.0) & (colour <= 1.0)).all():
         raise ValueError(f"{COLOUR} is no colour: {colour.tolist()}")
     names = [key for key in file.arrays if key.startswith(TILES)]
-    tiles = {key.removeprefix(TILES): _finite(file.arrays, key, (-1, 4)) for key in names}
-    if any(len(rows) == 0 or (np.abs(rows) > LARGE).any() for rows in tiles.values()):
-        raise ValueError("names rectangles of no usable size, or none")
+    tiles = {key.removeprefix(TILES): numbers(file.arrays, key, (-1, 4), LARGE) for key in names}
+    if not all(map(len, tiles.values())):
+        raise ValueError("names a part without rectangles")
     red, green, blue = colour.tolist()
     return HeadTexture(picture.tobytes(), (red, green, blue), tiles)
-
-
-def _finite(arrays: Mapping[str, Array], key: str, shape: tuple[int, ...]) -> Floats32:
-    """Return finite numbers; -1 in the shape is any length."""
-    found: Floats = arrays[key]
-    if found.ndim != len(shape) or any(w not in (-1, g) for g, w in zip(found.shape, shape, strict=True)):
-        raise ValueError(f"{key} has shape {found.shape}, expected {shape}".replace("-1", "any"))
-    if found.dtype.kind not in "fiu" or not np.isfinite(found).all():
-        raise ValueError(f"{key} holds what is no number")
-    return np.ascontiguousarray(found, np.float32)

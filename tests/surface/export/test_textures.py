@@ -12,7 +12,6 @@ import pytest
 from surface.export.textures import (
     EYE_RIM,
     STRAND_CUTOFF,
-    decode_srgb,
     encode_srgb,
     eye_column,
     eye_picture,
@@ -21,6 +20,7 @@ from surface.export.textures import (
     strand_picture,
     strip_picture,
 )
+from surface.readers.meshdata import linear as decode_srgb
 
 
 def test_strands_have_heights_about_a_half_and_few_stand_above_full_cover() -> None:
