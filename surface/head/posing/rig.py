@@ -22,6 +22,9 @@ from surface.head.posing.tongue import tongue_rest
 
 CLEARANCE_GRID = (72, 36)  # samples of the part behind the lids, along u and v
 CLEARANCE_RADII = 1.4  # distance in eyeball radii below which points behind the lids are kept outside the eyeball
+LID_WAY_MM = 20.0
+"""Points of what lines the lids that a group moves further than any lid goes are not kept at their distance from the
+eyeball. Least squares sends those so far that hardly act, and distances of several groups do not add up there."""
 UNDONE_MM = 20.0  # displacement by mouthClose that takes back the whole motion of the jaw
 OWN_PARTED_MM = 2.0
 """Own changes that part the lips by so much open them in full. The seal says by what share of it lips stay together."""
@@ -229,7 +232,10 @@ class Lids:
     """Keeps the lids of one part, its points with ``lids``, at their distance from the eyeballs while they slide."""
 
     def __init__(self, part: PartData, head: HeadData, moves: Moves) -> None:
-        self._ids = ids = np.flatnonzero(part.lids).astype(np.int64)
+        ids = np.flatnonzero(part.lids).astype(np.int64)
+        if all(c.part != part.name for c in head.contacts):
+            ids = ids[np.linalg.norm(moves.at(ids), axis=2).max(axis=0, initial=0.0) < LID_WAY_MM]
+        self._ids = ids
         eye = np.ascontiguousarray(head.eyes[(part.lids[ids] < 0).astype(int)], np.float64)
         from_eye = part.points[ids] - eye
         rest = np.linalg.norm(from_eye, axis=1)

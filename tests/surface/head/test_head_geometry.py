@@ -154,6 +154,14 @@ def test_lids_that_are_shut_squinting_and_wide_at_once_do_not_cross(head, lids, 
     assert crossing(*lids[side])[0] < 0.4
 
 
+@pytest.mark.parametrize("side", ["Left", "Right"])
+def test_what_lines_the_lids_stays_behind_them_in_a_blink_of_a_squinting_eye_with_a_raised_cheek(head, lids, side):
+    # 1.07 mm on the right side where far points of the lining were kept at their distance from the eyeball, too
+    shapes = {"eyeBlink": 1.0, "eyeSquint": 0.8, "cheekSquint": 0.8}
+    head.pose(head.values({f"{name}{side}": value for name, value in shapes.items()}))
+    assert crossing(*lids[side])[0] < 0.4
+
+
 def test_the_measure_of_crossings_finds_one(head, lips):
     head.pose(head.values({}))
     lower, part = lips[1], head.part("face")
