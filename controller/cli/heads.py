@@ -60,7 +60,12 @@ Expression = Annotated[
 ]
 Setting = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="NAME=VALUE", help="Set a parameter; may be repeated.", autocompletion=setting_names),
+    typer.Option(
+        "--set",
+        metavar="NAME=VALUE",
+        help="Set a parameter; a name without Left or Right sets both sides. May be repeated.",
+        autocompletion=setting_names,
+    ),
 ]
 MAX_CROWD = 1024
 HEAD = "Head: a name from configs/heads or a folder."

@@ -28,6 +28,7 @@ from controller.stage.stage import (
     parse_identity,
     with_picture,
 )
+from controller.vocabulary.sides import sides
 from controller.vocabulary.vocabulary import Vocabulary
 from surface.head import Crowd, Head
 from surface.view.pictures.offscreen import Offscreen
@@ -76,8 +77,8 @@ class Still:
         for word in expressions:
             _add_expression(parameters, vocabulary, values, word)
         for word in settings:
-            index, value = parse_setting(word, parameters)
-            values[index] = value
+            places, value = parse_setting(word, parameters)
+            values[places] = value
         folder = base.head if base and head is None else find_config("heads", head or "ict")
         wanted = dict(base.settings.identity) if base and identity is None else parse_identity(identity)
         check_identity(folder, wanted)
@@ -106,18 +107,22 @@ def parse_group(word: str) -> tuple[Path, float]:
     return find_config("groups", name), amount
 
 
-def parse_setting(word: str, parameters: Parameters | None = None) -> tuple[int, float]:
-    """Parse ``NAME=VALUE`` as parameter index and value, which must be in the parameter's range."""
+def parse_setting(word: str, parameters: Parameters | None = None) -> tuple[list[int], float]:
+    """Parse ``NAME=VALUE`` as indices of parameters and their value, which must be in their range.
+
+    A name without a side means both. Raises ParameterError.
+    """
     name, equals, text = word.partition("=")
     if not equals:
         raise ParameterError(f"--set {word}: expected NAME=VALUE", hint="for example --set jawOpen=0.8")
     parameters = parameters or PARAMETERS
-    index = parameters.index(name)
+    places = sides(parameters, name) or [parameters.index(name)]
     value = _number(f"--set {word}", text)
-    low, high = parameters.low[index], parameters.high[index]
-    if not low <= value <= high:
-        raise ParameterError(f"--set {word}: {parameters.names[index]} goes from {low:g} to {high:g}")
-    return index, value
+    for index in places:
+        low, high = parameters.low[index], parameters.high[index]
+        if not low <= value <= high:
+            raise ParameterError(f"--set {word}: {parameters.names[index]} goes from {low:g} to {high:g}")
+    return places, value
 
 
 def _number(where: str, text: str) -> float:

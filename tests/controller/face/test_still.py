@@ -25,9 +25,16 @@ from controller.face.still import (
 
 def test_a_setting_names_a_parameter_in_any_spelling() -> None:
     jaw = PARAMETERS.index("jawOpen")
-    assert parse_setting("jawOpen=0.8") == (jaw, 0.8)
-    assert parse_setting("JawOpen=1") == (jaw, 1.0)
+    assert parse_setting("jawOpen=0.8") == ([jaw], 0.8)
+    assert parse_setting("JawOpen=1") == ([jaw], 1.0)
     assert parse_setting("headYaw=-1")[1] == -1.0
+
+
+def test_a_setting_without_a_side_means_both() -> None:
+    both = [PARAMETERS.index(f"noseSneer{side}") for side in ("Left", "Right")]
+    assert parse_setting("noseSneer=0.7") == (both, 0.7)
+    with pytest.raises(ParameterError, match="noseSneerLeft goes from 0 to 1"):
+        parse_setting("noseSneer=1.5")
 
 
 @pytest.mark.parametrize(
