@@ -1,4 +1,7 @@
-"""Exports heads as Wavefront OBJ with materials, in millimetres; a folder beside it gets one OBJ for each shape."""
+"""Exports heads as Wavefront OBJ with materials, in millimetres.
+
+A folder beside it gets one OBJ for each shape, another the pictures of its materials.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,8 @@ from surface.base.files import open_file
 from surface.base.writing import replacing
 from surface.export.exporter import Exporter
 from surface.export.frames import in_file, placement_of
+from surface.export.mtl import ObjMaterials
 from surface.export.shapes import ExportPart, export_parts, is_posed
-from surface.export.textures import materials
 from surface.export.worn import accessory_parts
 from surface.head import Head
 
@@ -45,20 +48,23 @@ def _parts(head: Head, pose: Mapping[str, float]) -> list[ExportPart]:
 
 
 def _write_parts(parts: list[ExportPart], path: Path, title: str) -> list[Path]:
-    """Write the OBJ with its materials and its folder of shapes; nothing is replaced before all of it is complete.
+    """Write the OBJ with its materials and its folders of shapes and pictures; nothing is replaced before all of it is
+    complete.
 
     Returns the paths.
     """
+    looks = ObjMaterials(parts)
+    pictures = path.with_name(f"{path.stem}_textures")
     shapes = dict.fromkeys(name for part in parts for name in part.displacements)
     vertices, normals = (np.concatenate([getattr(p, key) for p in parts]) for key in ("vertices", "normals"))
     textures = [f"vt {u:.6f} {v:.6f}" for part in parts for u, v in part.uv.tolist()]
-    faces, rows = _faces(parts), _rows("v", vertices)
+    faces, rows = _faces(parts, looks.names), _rows("v", vertices)
     folder = path.with_name(f"{path.stem}_shapes")
     with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.stem}-") as temporary:
         made = [Path(temporary) / target.name for target in (path, path.with_suffix(".mtl"))]
         points = [*rows, *textures, *_rows("vn", normals)]
         _write(made[0], [title, f"mtllib {path.stem}.mtl", *points, *faces])
-        _write(made[1], _materials(parts))
+        _write(made[1], looks.lines(pictures.name))
         if shapes:
             made.append(Path(temporary) / folder.name)
             made[2].mkdir()
@@ -67,12 +73,18 @@ def _write_parts(parts: list[ExportPart], path: Path, title: str) -> list[Path]:
             _write(made[2] / f"{name}.obj", [title, *_moved_rows(rows, vertices, moves), *textures, *faces])
         if shapes:
             folder.mkdir(exist_ok=True)
+        if looks.pictures:
+            pictures.mkdir(exist_ok=True)
+        for name, picture in looks.pictures.items():
+            with replacing(pictures / name) as beside:
+                beside.write_bytes(picture)
         for new in made[:2]:  # everything is complete: replace the old
             with replacing(path.parent / new.name) as beside:
                 shutil.copyfile(new, beside)
         if shapes:
             _replace_shapes(made[2], folder)
-    return [path, path.with_suffix(".mtl"), *([folder] if shapes else [])]
+    made_folders = [at for at, there in ((folder, shapes), (pictures, looks.pictures)) if there]
+    return [path, path.with_suffix(".mtl"), *made_folders]
 
 
 def _replace_shapes(new: Path, folder: Path) -> None:
@@ -96,7 +108,7 @@ def _is_own(path: Path) -> bool:
 EXPORTER = Exporter(
     api=1,
     kind="obj",
-    title="the face at rest with its materials, and a folder beside it with one file for each shape",
+    title="the face at rest with its materials and textures, and a folder beside it with one file for each shape",
     suffixes=(".obj",),
     write=write_obj,
     write_in_file=write_obj_in_file,
@@ -119,19 +131,10 @@ def _moved_rows(rows: list[str], vertices: Floats32, moves: Floats32) -> list[st
     return out
 
 
-def _faces(parts: list[ExportPart]) -> list[str]:
+def _faces(parts: list[ExportPart], looks: list[str]) -> list[str]:
     out, start = [], 1
-    for part in parts:
-        out += [f"o {part.name}", f"usemtl {part.material}"]
+    for part, look in zip(parts, looks, strict=True):
+        out += [f"o {part.name}", f"usemtl {look}"]
         out += ["f " + " ".join(f"{i}/{i}/{i}" for i in corner) for corner in (part.triangles + start).tolist()]
         start += len(part.vertices)
-    return out
-
-
-def _materials(parts: list[ExportPart]) -> list[str]:
-    out = []
-    for name in dict.fromkeys(part.material for part in parts):
-        table = materials().get(name, materials()["skin"])
-        colour = " ".join(f"{c ** (1 / 2.2):.4f}" for c in table["colour"])
-        out += [f"newmtl {name}", f"Kd {colour}", f"Ns {1000 * (1 - table['roughness']) ** 2:.1f}", "illum 2", ""]
     return out

@@ -39,13 +39,6 @@ def test_all_parts_come_one_after_the_other_counted_from_one(tmp_path, head):
     assert first == ["# small, written by omote; millimetres, y up, z forward", "mtllib h.mtl"]
 
 
-def test_materials_are_written_once_in_display_colours(tmp_path, head):
-    export_head(head, tmp_path / "h.obj")
-    text = (tmp_path / "h.mtl").read_text()
-    # linear 0.60, 0.37, 0.28 with gamma 2.2, worked out by a pocket calculator; 1000 (1 - 0.55)^2 = 202.5
-    assert text == "newmtl skin\nKd 0.7928 0.6364 0.5607\nNs 202.5\nillum 2\n\n"
-
-
 def test_every_shape_is_a_file_with_the_same_faces(tmp_path, head):
     written = export_head(head, tmp_path / "h.obj")
     assert written == [tmp_path / "h.obj", tmp_path / "h.mtl", tmp_path / "h_shapes"]
