@@ -29,6 +29,7 @@ from surface.readers.npzmesh import read_npz
 from surface.readers.obj import read_obj
 
 SUFFIXES = (".glb", ".gltf", ".vrm", ".obj", ".npz")
+SCANS = (".ply", ".stl", ".off")  # formats of meshes that have no shapes
 VOWELS = ("jawOpen", "mouthFunnel", "mouthPucker")  # made of vowels, where the mesh has no such shapes
 
 
@@ -167,8 +168,12 @@ def read_mesh(path: Path, shapes: Path | None) -> MeshData:
         return read_gltf(path)
     if kind == ".npz":
         return read_npz(path)
+    if kind in SCANS:
+        raise FitError(f"{path}: a {kind} file has no shapes for expressions",
+                       hint="take them from a head that has some: add --expressions-from ict")  # fmt: skip
+    kinds = f"{', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}"
     raise FitError(f"{path}: {kind or 'a file without suffix'} is no mesh that can be read",
-                   hint=f"export it as {', '.join(SUFFIXES[:-1])} or {SUFFIXES[-1]}")  # fmt: skip
+                   hint=f"open it in a program such as Blender and export it as {kinds}")  # fmt: skip
 
 
 def wanted_faces(mesh: FitMesh | MeshData, words: tuple[str, ...], where: str) -> Bools:

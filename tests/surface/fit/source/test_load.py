@@ -12,6 +12,13 @@ from surface.fit.source.mesh import check_manifold
 from surface.readers import meshdata
 
 
+@pytest.mark.parametrize("kind", [".ply", ".stl", ".off"])
+def test_of_a_mesh_that_can_have_no_shapes_it_is_told_where_to_take_them_from(tmp_path, kind):
+    with pytest.raises(FitError, match=rf"a \{kind} file has no shapes") as told:
+        load_mesh(tmp_path / f"m{kind}")
+    assert "--expressions-from ict" in told.value.hint
+
+
 def test_an_unknown_suffix_and_misplaced_shapes(tmp_path):
     with pytest.raises(FitError, match=r"\.fbx is no mesh"):
         load_mesh(tmp_path / "m.fbx")
