@@ -39,7 +39,7 @@ def draw_film(
 
 
 def _pictures(still: Still, rows: Floats, fps: float, progress: Callable[[int, int], None]) -> Iterator[np.ndarray]:
-    head, look = still.load_head(), still.look
+    head, look = still.load_head(still.chord_mm), still.look
     camera = framed(look.make_camera(), head, worn=look.dressed)
     with Offscreen(
         head, still.size, quality=look.still_quality, theme=look.make_theme(), evaluator=look.evaluator

@@ -36,6 +36,9 @@ from surface.view.pictures.sheet import compose, contact_sheet, crowd_sheet, wri
 from surface.view.scene.camera import Camera
 from surface.view.scene.framing import framed
 
+CHORD_PIXELS = 0.42  # an outline bends unseen by less; up to 800 pixels the shipped head is as it is stored
+SHOWN_MM = 470.0  # of the shipped head, along a side of a picture that the named cameras take
+
 
 @dataclass(frozen=True)
 class Still:
@@ -92,11 +95,18 @@ class Still:
             wall = with_picture(base, look or {})
         return cls(values, width_height, picture, folder, wanted, added, vocabulary, persons, parameters, wall)
 
-    def load_head(self) -> Head:
+    def load_head(self, chord_mm: float | None = None) -> Head:
         """Load the head with its persons, identity and groups; see :func:`controller.stage.stage.load_head`."""
         dressed = self.look.dressed
         own = self.parameters.point_groups
-        return load_head(self.head, self.identity, self.groups, self.persons, dressed=dressed, own=own)
+        return load_head(
+            self.head, self.identity, self.groups, self.persons, dressed=dressed, own=own, chord_mm=chord_mm
+        )
+
+    @property
+    def chord_mm(self) -> float:
+        """How far the edges of triangles may lie from the skin, mm, so that no outline of the picture shows them."""
+        return CHORD_PIXELS * SHOWN_MM / max(self.size)
 
 
 def parse_group(word: str) -> tuple[Path, float]:
@@ -169,7 +179,7 @@ def draw_still(still: Still, out: Path) -> None:
     if still.wall is not None:
         _draw_wall(still.wall, still, out)
         return
-    head, look = still.load_head(), still.look
+    head, look = still.load_head(still.chord_mm), still.look
     with Offscreen(
         head, still.size, quality=look.still_quality, theme=look.make_theme(), evaluator=look.evaluator
     ) as screen:

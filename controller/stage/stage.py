@@ -197,11 +197,12 @@ def load_head(
     folder: Path, identity: Mapping[str, float], groups: Sequence[tuple[Path, float]],
     persons: Sequence[tuple[Person, float]] = (), *, dressed: bool = True,
     own: Mapping[str, PointGroup] = MappingProxyType({}), light: Sequence[LightPoints] = (),
+    chord_mm: float | None = None,
 ) -> Head:  # fmt: skip
     """Load a head with the appearance of ``persons``, and with identities and groups added by their amounts.
 
     dressed : with hair and clothes. own : control points that custom parameters move.
-    light : control points to add after those of the groups.
+    light : control points to add after those of the groups. chord_mm : see :meth:`surface.head.Head.load`.
 
     Raises SurfaceError: the head cannot be read. ConfigError: a group does not fit it.
     """
@@ -213,7 +214,8 @@ def load_head(
     found = [read_group(path)[1] for path in files]
     added = [*light_of(found), *light]
     try:
-        head = Head.load(folder, mixed_identity(persons, identity), mixed_look(persons, dressed=dressed), added)
+        look = mixed_look(persons, dressed=dressed)
+        head = Head.load(folder, mixed_identity(persons, identity), look, added, chord_mm)
     except ValueError as error:
         hint = "make the group again on this head, or take it out of the stage"
         raise ConfigError(f"{folder}: control points of a group do not fit this head: {error}", hint=hint) from error

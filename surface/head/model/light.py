@@ -12,15 +12,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
 from surface.base.arrays import Array, Floats, Ints
 from surface.head.model.data import Group, HeadData, PartData
-from surface.head.model.meshes import make_surface, pack, tessellate, unpack
+from surface.head.model.finer_mesh import FinerMesh
+from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.mesh.mesh import Mesh
-from surface.mesh.splitedges import Middles, split_edges
+from surface.mesh.splitedges import split_edges
 
 WEIGHT = 1e-4
 MAX_EDGE = 0.5  # of triangles that such points influence, in spans of their knots
@@ -149,7 +149,7 @@ def _carry_group(group: Group, share: Array, n: int) -> Group:
     return Group(group.name, ids.astype(np.int32), moves.astype(np.float32))
 
 
-class Refined:
+class Refined(FinerMesh):
     """A part's mesh with shorter edges where light points reach: its vertices keep their numbers, new ones follow.
 
     mesh : the mesh before. own : the points. part : without them. coarser : fewer triangles over the mesh, by level.
@@ -160,27 +160,19 @@ class Refined:
     """
 
     def __init__(self, mesh: Mesh, own: LightPoints, part: PartData, coarser: Mapping[str, Ints]) -> None:
-        self.mesh, self._own, self._surface = mesh, own, make_surface(part)
-        self._count = len(mesh.uv)
-        self._middles = Middles(self._count)
+        super().__init__(mesh, part)
+        self._own = own
         self._spans = np.column_stack([np.diff(k, axis=1).mean(axis=1) for k in (own.knots_u, own.knots_v)])
         _, along_u, along_v = self._surface.derivatives(own.centres)
         millimetres = np.column_stack([np.linalg.norm(along_u, axis=1), np.linalg.norm(along_v, axis=1)])
         self._longest = np.maximum(MAX_EDGE * (self._spans * millimetres).min(axis=1), 2 * MIN_EDGE_MM)
-        self._uv, self._places = mesh.uv, mesh.vertices
         self.triangles = self._refine(np.asarray(mesh.triangles, np.int64))
         inner = {level: (each < self._count).all(axis=1) for level, each in coarser.items()}
         finer = {level: self._refine(np.asarray(each[inner[level]], np.int64)) for level, each in coarser.items()}
-        new = len(self.ends)  # what seams added comes behind the new vertices
         self.coarser = {
-            level: np.concatenate([finer[level], each[~inner[level]] + new * (each[~inner[level]] >= self._count)])
+            level: np.concatenate([finer[level], self._behind_new(each[~inner[level]])])
             for level, each in coarser.items()
         }
-
-    @property
-    def ends(self) -> Ints:
-        """(k, 2) the two vertices between which each new one lies; they may be earlier new ones."""
-        return np.array(self._middles.ends, np.int64).reshape(-1, 2)
 
     def _refine(self, triangles: Ints) -> Ints:
         """Return triangles (t', 3) with shorter edges where light points reach, of (t, 3) over the mesh's own vertices.
@@ -202,14 +194,6 @@ class Refined:
         near: np.ndarray = ((places.min(axis=1) < high) & (places.max(axis=1) > low)).all(axis=1)
         return near
 
-    def _place(self) -> None:
-        """Put vertices that were made since the last call onto the surface."""
-        ends = self.ends[len(self._uv) - self._count :]
-        if len(ends):
-            uv = self._uv[ends].mean(axis=1)
-            self._uv = np.concatenate([self._uv, uv])
-            self._places = np.concatenate([self._places, self._surface.evaluate(uv)])
-
     def _is_long(self, edges: Ints) -> np.ndarray:
         """Return (e,): which edges reach a light point and are longer than there is use for."""
         length = np.linalg.norm(self._places[edges[:, 0]] - self._places[edges[:, 1]], axis=1)
@@ -225,42 +209,13 @@ class Refined:
             out[which] = (inside & (length[which, None] > self._longest)).any(axis=1)
         return out
 
-    def pack_finer(self, grown: PartData) -> dict[str, Array]:
-        """Return the finer mesh of the part with the points, as arrays to keep: new vertices are in cells of their
-        own.
-        """
-        mesh, surface = self.mesh, make_surface(grown)
-        lists = self._with_own(surface.n - len(self._own))
-        starts = [mesh.cell_start]
-        if len(self.ends):
-            basis = surface.basis_matrix(self._uv[self._count :]).tocsr()
-            cuts = np.append(np.arange(0, len(self.ends), 64), len(self.ends))
-            starts.append(self._count + cuts[1:])
-            lists += [np.unique(basis[a:b].indices).astype(np.int32) for a, b in pairwise(cuts)]
-        finer = replace(
-            mesh,
-            vertices=self._places, normals=np.zeros_like(self._places), triangles=self.triangles.astype(np.int32),
-            uv=self._uv, side=np.concatenate([mesh.side, np.zeros(len(self.ends), np.int64)]),
-            cell_start=np.concatenate(starts), list_start=np.cumsum([0, *map(len, lists)]),
-            list_ids=np.concatenate(lists).astype(np.int32),
-        )  # fmt: skip
-        return pack(finer, grown.budget)
-
-    def _with_own(self, first: int) -> list[Array]:
+    def _lists(self, count: int) -> list[Array]:
         """Return, by cell of the mesh, its points and the light points that reach it."""
         boxes, _ = self.mesh.cell_boxes
+        first = count - len(self._own)
         u, v = self._own.knots_u, self._own.knots_v
         lists = []
         for c, (u0, u1, v0, v1) in enumerate(boxes.tolist()):
             reached = (u[:, 0] <= u1) & (u[:, -1] >= u0) & (v[:, 0] <= v1) & (v[:, -1] >= v0)
             lists.append(np.concatenate([self.mesh.points_of(c), first + np.flatnonzero(reached)]))
         return lists
-
-    def carry(self, values: Array) -> Array:
-        """Return rows (m, ...) by vertex, behind the mesh's own those that seams added, with rows for new vertices
-        between."""
-        own = [np.asarray(values[: self._count], np.float64)]
-        rows = np.concatenate([own[0], np.zeros((len(self.ends), *values.shape[1:]))])
-        for i, (a, b) in enumerate(self.ends.tolist(), self._count):
-            rows[i] = (rows[a] + rows[b]) / 2
-        return np.concatenate([rows.astype(values.dtype), values[self._count :]])

@@ -219,14 +219,14 @@ class _Seams:
         by_name = {decimated.part.name: decimated for decimated in parts}
         self._pairs: list[tuple[DecimatedPart, DecimatedPart]] = []
         none = np.zeros(0, np.int64)
-        rows = [(none, none, none, np.zeros(0, np.float32))]
+        rows = [(none, none, none, *2 * [np.zeros(0, np.float32)])]
         for stitch in stitches:
             one, two = by_name[stitch.first.name], by_name[stitch.second.name]
             drawn = np.isin(stitch.ids, two.kept)
             if drawn.any():
                 self._pairs.append((one, two))
                 low, high = one.rows(stitch.low[drawn]), one.rows(stitch.high[drawn])
-                rows.append((two.rows(stitch.ids[drawn]), low, high, stitch.share[drawn]))
+                rows.append((two.rows(stitch.ids[drawn]), low, high, stitch.share[drawn], stitch.inward[drawn]))
         self._rows = [np.concatenate(column) for column in zip(*rows, strict=True)]
 
     def close(self, vertices: Floats32, normals: Floats32) -> None:

@@ -1,4 +1,4 @@
-"""What is kept beside a head for its meshes, for meshes that light control points made finer."""
+"""What is kept beside a head for its meshes, for meshes that were made finer."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from surface.base.arrays import Ints
-from surface.head.model.light import Refined
+from surface.head.model.finer_mesh import FinerMesh
 from surface.head.posing.baked import (
     LEVELS,
     apply_decimated,
@@ -40,7 +40,7 @@ def coarser_of(path: str | Path, name: str, mesh: Mesh) -> Mapping[str, Ints]:
     return {level: found[f"{name}/{level}"].astype(np.int64) for level in LEVELS if f"{name}/{level}" in found}
 
 
-def apply_baked(path: str | Path, parts: Iterable[HeadPart], refined: Mapping[str, Refined]) -> None:
+def apply_baked(path: str | Path, parts: Iterable[HeadPart], refined: Mapping[str, FinerMesh]) -> None:
     """Give parts their shade, decimated triangles and fit error; ``refined`` : the parts whose meshes became finer.
 
     Raises HeadFileError, as the readers do.

@@ -13,12 +13,14 @@ from surface.base.errors import HeadFileError
 from surface.head.model.accessories import read_accessories
 from surface.head.model.data import Contact, Group, HeadData, PartData
 from surface.head.model.file import load_data
+from surface.head.model.finer_mesh import FinerMesh
 from surface.head.model.identity import load_identities, with_identities
-from surface.head.model.light import LightPoints, Refined, with_light
+from surface.head.model.light import LightPoints, with_light
 from surface.head.model.look import Look, with_age, with_forehead
 from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.head.model.own_groups import OwnAmounts, OwnGroup, OwnMoves
 from surface.head.model.parameters import NAMES, SHAPES, Pose, read_pose, rotation
+from surface.head.model.rounding import with_rounder_skin
 from surface.head.model.rules import Drivers
 from surface.head.model.sidecar import DAMAGED, reason
 from surface.head.model.sway import Sway
@@ -71,13 +73,15 @@ class Head:
     @classmethod
     def load(
         cls, path: str | Path, identity: Mapping[str, float] | None = None, look: Look | None = None,
-        light: Sequence[LightPoints] = (),
+        light: Sequence[LightPoints] = (), chord_mm: float | None = None,
     ) -> Head:  # fmt: skip
         """Read a head from its folder or its head.toml.
 
         identity : variations of the head to mix in, by name, each by 0 to 1.
         look : colours of a person, and what is worn; the head's own where it is None.
         light : control points to add behind those of each part, see :mod:`surface.head.model.light`.
+        chord_mm : how far edges of skin may lie from its surface, mm, where the head's own may lie farther: for large
+        pictures, whose outlines would show them; every pose takes longer.
 
         Raises HeadFileError: a file is missing, damaged, cut short, of another version or made for another mesh (names
         file and key), or the head has no identity of that name. ValueError: control points that cannot be added.
@@ -87,9 +91,11 @@ class Head:
         garments = tuple(read_garment(worn) for worn in look.worn) if look is not None else ()
         if garments:
             data = with_garments(data, garments, str(path))
-        refined: Mapping[str, Refined] = {}
+        refined: Mapping[str, FinerMesh] = {}
         if light:
             data, refined = with_light(data, light, partial(coarser_of, path))
+        if chord_mm is not None:
+            data, refined = with_rounder_skin(data, chord_mm, refined, partial(coarser_of, path))
         accessories, texture = read_accessories(path), read_texture(path)
         try:
             head = cls(data, str(path))

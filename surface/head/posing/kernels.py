@@ -233,10 +233,11 @@ def nearest_on_line(uv: Floats, line: Floats, closed: bool, distance: Floats, at
 @nonallocating
 def stitch_border(
     vertices: Floats32, normals: Floats32, to_vertices: Floats32, to_normals: Floats32, ids: Ints,
-    low: Ints, high: Ints, share: Floats32,
+    low: Ints, high: Ints, share: Floats32, inward: Floats32,
 ) -> None:  # fmt: skip
     """Put rows ``ids`` of ``to_vertices (m, 3)`` between rows ``low`` and ``high`` of ``vertices``, at ``share`` of
-    the way; normals alike, to length 1 where they have any."""
+    the way; normals alike, to length 1 where they have any. ``inward`` : mm by which each goes on beside that way, in
+    the surface, to the left where it is above 0, seen with the normal upright."""
     for k in range(ids.shape[0]):
         i, a, b, t = ids[k], low[k], high[k], share[k]
         square = np.float32(0.0)
@@ -248,6 +249,22 @@ def stitch_border(
             scale = 1.0 / np.sqrt(square)
             for c in range(3):
                 to_normals[i, c] *= scale
+            if inward[k] != 0.0:
+                _go_beside(to_vertices[i], to_normals[i], vertices[a], vertices[b], inward[k])
+
+
+@kernel
+def _go_beside(place: Floats32, normal: Floats32, start: Floats32, end: Floats32, far: float) -> None:
+    """Move a place (3,) by ``far`` across the way from ``start`` to ``end``, and across the normal."""
+    x, y, z = end[0] - start[0], end[1] - start[1], end[2] - start[2]
+    u = normal[1] * z - normal[2] * y
+    v = normal[2] * x - normal[0] * z
+    w = normal[0] * y - normal[1] * x
+    length = np.sqrt(u * u + v * v + w * w)
+    if length > 1e-9:
+        place[0] += far * u / length
+        place[1] += far * v / length
+        place[2] += far * w / length
 
 
 @kernel
@@ -256,5 +273,5 @@ def stitch_bound(table: Ints) -> None:
     stitch_border(
         wide(table, 0, 3, np.float32), wide(table, 1, 3, np.float32), wide(table, 2, 3, np.float32),
         wide(table, 3, 3, np.float32), flat(table, 4, np.int64), flat(table, 5, np.int64), flat(table, 6, np.int64),
-        flat(table, 7, np.float32),
+        flat(table, 7, np.float32), flat(table, 8, np.float32),
     )  # fmt: skip

@@ -44,7 +44,9 @@ def test_every_row_is_a_picture_at_its_time(monkeypatch: pytest.MonkeyPatch) -> 
         evaluator="cpu",
         dressed=False,
     )
-    still: Any = SimpleNamespace(load_head=lambda: head, look=look, size=(64, 48), parameters=P)
+    still: Any = SimpleNamespace(
+        load_head=lambda chord_mm: {0.5: head}[chord_mm], look=look, size=(64, 48), parameters=P, chord_mm=0.5
+    )
 
     def screen(*given: Any, **how: Any) -> Screen:
         screens.append(Screen(*given, **how))

@@ -15,12 +15,14 @@ from controller.face.still import (
     Still,
     crowd_poses,
     draw_crowd,
+    draw_still,
     for_head,
     parse_group,
     parse_setting,
     parse_size,
     sheet_poses,
 )
+from surface.head import Head
 
 
 def test_a_setting_names_a_parameter_in_any_spelling() -> None:
@@ -98,6 +100,22 @@ def test_a_stage_lends_a_picture_its_head_expressions_and_look(own: Path) -> Non
     assert "grin" in dict(sheet_poses(still.vocabulary))
     said = Still.parse([], [], "64x64", {"theme": "skin", "camera": None}, identity="", stage=str(own / "stage.toml"))
     assert (said.size, said.look.theme, said.identity) == ((64, 64), "skin", {})
+
+
+@pytest.mark.slow
+def test_large_pictures_have_rounder_skin_than_small_ones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    counts: list[int] = []
+    loaded = Still.load_head
+
+    def count(self: Still, chord_mm: float | None = None) -> Head:
+        head = loaded(self, chord_mm)
+        counts.append(len(head.part("face").vertices))
+        return head
+
+    monkeypatch.setattr(Still, "load_head", count)
+    for size in ("800x800", "64x2048"):
+        draw_still(Still.parse([], [], size), tmp_path / "out.png")
+    assert counts[0] == len(Still.parse([], []).load_head().part("face").vertices) < counts[1] / 2
 
 
 @pytest.mark.slow

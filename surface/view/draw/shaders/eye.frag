@@ -1,3 +1,5 @@
+#define SINKING 1.7              // of what a lamp mirrors, with the height of a gaze below the horizon
+
 uniform sampler2D detail;
 uniform mat3 eye_rotation;            // eye's own frame to world
 uniform vec3 lid_upper[LID_POINTS];   // lid margins now, world, mm
@@ -101,10 +103,12 @@ void main() {
     vec3 lit = albedo * light * shade * caustic;
 
     vec3 mirrored = reflect(-v, cornea);
-    // The key light mirrors as two windows side by side, the fill as a soft lamp.
-    float towards_key = dot(mirrored, key_direction);
-    float key = 1.1 * windows(mirrored) * step(0.0, towards_key) + 0.05 * lobe(towards_key, 30.0);
-    float fill = smoothstep(0.965, 0.990, dot(mirrored, fill_direction)) * 0.5;
+    // The key light mirrors as two windows side by side, the fill as a soft lamp. Above an eye that looks down the lid
+    // would cover both, and the eye would look dull: they sink with it, most of the way.
+    vec3 lamps = normalize(mirrored + vec3(0.0, SINKING * max(-axis.y - 0.05, 0.0), 0.0));
+    float towards_key = dot(lamps, key_direction);
+    float key = 1.1 * windows(lamps) * step(0.0, towards_key) + 0.05 * lobe(towards_key, 30.0);
+    float fill = smoothstep(0.965, 0.990, dot(lamps, fill_direction)) * 0.5;
     float fresnel = 1.0 - clamp(dot(cornea, v), 0.0, 1.0);
     fresnel = 0.03 + 0.5 * fresnel * fresnel * fresnel;
     lit += (key * key_colour + fill * fill_colour) * smoothstep(0.0, 1.2, lid.x);

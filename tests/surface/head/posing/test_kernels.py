@@ -103,10 +103,22 @@ def test_a_border_is_put_between_vertices_with_unit_normals() -> None:
     normals = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0]], np.float32)
     to, to_normals = np.full((3, 3), 7.0, np.float32), np.full((3, 3), 7.0, np.float32)
     ids, low, high = np.array([0, 2]), np.array([0, 0]), np.array([1, 2])
-    stitch_border(vertices, normals, to, to_normals, ids, low, high, np.array([0.25, 0.5], np.float32))
+    share, inward = np.array([0.25, 0.5], np.float32), np.zeros(2, np.float32)
+    stitch_border(vertices, normals, to, to_normals, ids, low, high, share, inward)
     np.testing.assert_allclose(to, [[1, 0, 2], [7, 7, 7], [0.5, 0.5, 0.5]])
     np.testing.assert_allclose(to_normals[0], np.array([3.0, 1.0, 0.0]) / np.sqrt(10.0), atol=1e-6)
     np.testing.assert_array_equal(to_normals[2], 0.0)  # opposite ones cancel
+
+
+@pytest.mark.parametrize("far", [0.5, -0.5])
+def test_a_border_may_go_beside_the_way_between_two_vertices_in_the_surface(far: float) -> None:
+    vertices = np.array([[0, 0, 0], [4, 0, 0]], np.float32)
+    normals = np.tile(np.float32([0, 0, 1]), (2, 1))
+    to, to_normals = np.zeros((1, 3), np.float32), np.zeros((1, 3), np.float32)
+    rows = [np.array([k]) for k in (0, 0, 1)]
+    stitch_border(vertices, normals, to, to_normals, *rows, np.float32([0.25]), np.float32([far]))
+    np.testing.assert_allclose(to, [[1, far, 0]], atol=1e-6)
+    np.testing.assert_array_equal(to_normals, [[0, 0, 1]])
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.7, 3.0])

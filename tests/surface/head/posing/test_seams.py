@@ -10,7 +10,7 @@ from small_head import all_points, part, small_head
 from surface.head import Head
 from surface.head.model.data import Seam
 from surface.head.posing.part import border_edges
-from surface.head.posing.seams import SeamStitch, _vertices_around
+from surface.head.posing.seams import OVERLAP_MM, SeamStitch, _vertices_around
 
 
 def border_points(p, x: float) -> np.ndarray:
@@ -164,7 +164,8 @@ def test_vertices_between_two_of_the_first_part_are_put_on_its_edge() -> None:
     assert set(zip(stitch.low.tolist(), stitch.high.tolist(), strict=True)) == {(0, 1)}
     first.vertices[1] = [0.5, 2.0, 0.0]
     stitch.close()
-    np.testing.assert_allclose(second.vertices[:3, :2], [[0, 0], [0.125, 0.5], [0.5, 2.0]], atol=1e-6)
+    over = OVERLAP_MM * np.array([-2.0, 0.5]) / np.hypot(2.0, 0.5)  # beyond the edge, where the first part lies
+    np.testing.assert_allclose(second.vertices[:3, :2], [[0, 0], np.array([0.125, 0.5]) + over, [0.5, 2.0]], atol=1e-6)
     np.testing.assert_allclose(second.vertices[4, :2], [0.0, 1.2])
 
 
@@ -180,7 +181,20 @@ def test_what_lies_beyond_either_end_of_the_first_border_is_left_where_it_is() -
     assert stitch.ids[:3].tolist() == [2, 3, 4] and len(stitch.ids) == 4  # and a sliver's, at the first's 0.5
     first.vertices[:, 0] += 0.3
     stitch.close()
-    assert second.vertices[:corner, 0] == pytest.approx([0, 0, 0.3, 0.3, 0.3, 0, 0], abs=1e-6)
+    assert second.vertices[:corner, 0] == pytest.approx([0, 0, 0.3, 0.3 - OVERLAP_MM, 0.3, 0, 0], abs=1e-6)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+@pytest.mark.parametrize("turned", [False, True])
+def test_what_only_the_second_part_has_reaches_over_the_first_on_whichever_side_that_lies(
+    side: float, turned: bool
+) -> None:
+    """Exactly on the edge it would be rounded to either side of it, and a picture would have holes."""
+    triangle = [0, 1, 2] if turned else [2, 1, 0]
+    first = Patch([(0.0, 0.0), (0.0, 1.0), (side, 0.5)], [triangle])
+    second = Patch([(0.0, 0.0), (0.0, 0.3), (0.0, 1.0), (-side, 0.5)], [[0, 3, 1], [1, 3, 2]])
+    SeamStitch(Seam("a", "b", LINE, LINE), first, second).close()
+    assert second.vertices[:3, 0] == pytest.approx([0.0, side * OVERLAP_MM, 0.0], abs=1e-6)
 
 
 def test_no_sliver_bridges_a_gap_in_the_second_border() -> None:
