@@ -11,6 +11,12 @@ from surface.head.model.data import Rule, Seal
 from surface.head.model.parameters import SHAPES, SIDES
 
 
+ROUNDS = {"mouthPucker": 1.2, "mouthFunnel": 0.7, "tongueOut": -2.0}
+"""Shares of shapes in how round an open mouth is: the orbicularis draws the lips together at its corners."""
+_JAW, _TORN = SHAPES.index("jawOpen"), (0.3, 0.8)
+"""Amounts of jawOpen between which rounded lips are drawn apart again."""
+
+
 class Drivers:
     """Computes amounts of all groups: the 52 shapes, then those of ``rules``, in order; ``where`` names the file.
 
@@ -74,6 +80,7 @@ class SealDriver:
         self._of: Floats | None = None
         self._own = 0.0
         shares = seal.opens if seal else {}
+        self._rounds = [(SHAPES.index(name), share) for name, share in ROUNDS.items()]
         self._rows = np.array([[0.0 if n.endswith(other) else shares.get(n, 0.0) for n in SHAPES]
                                for other in reversed(SIDES)])  # fmt: skip
 
@@ -85,6 +92,20 @@ class SealDriver:
         if self._seal is not None and (shapes is not self._of or own != self._own):
             self._of, self._own, self._amount = shapes, own, self._at(shapes, own, self._seal)
         return self._amount
+
+    def rounding(self, shapes: Floats) -> float:
+        """Return how round an open mouth is, 0..1: as far as shapes pucker that keep the lips together.
+
+        A pucker that parts lips by itself, as drawn characters have it, is round as its maker drew it. A tongue that is
+        put out holds the corners apart, and a jaw that opens wide draws them apart.
+        """
+        if self._seal is None or self._seal.opens.get("mouthPucker", 0.0) >= 0.0:
+            return 0.0
+        puckered = sum(share * shapes[k] for k, share in self._rounds)
+        if puckered <= 0.0:
+            return 0.0
+        t = min(max((shapes[_JAW] - _TORN[0]) / (_TORN[1] - _TORN[0]), 0.0), 1.0)
+        return float(min(puckered, 1.0) * (1.0 - t * t * (3.0 - 2.0 * t)))
 
     def _at(self, shapes: Floats, own: float, seal: Seal) -> float:
         low, high = seal.closed, seal.parted

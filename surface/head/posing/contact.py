@@ -40,6 +40,7 @@ OVERLAP_MM = (0.28, 0.9)  # allowed overlap of lips and of lids: triangles cut a
 NEARLY_MM = 1.2  # lips nearer than this at rest count as closed
 HIDDEN_MM = 0.25  # by which each of two closed lips hides the other
 _CORNER_COLUMNS = 3.0  # from a corner, over which lips of a mesh that leaves them apart begin to be closed
+ROUND_FROM_TO = (0.4, 0.85)  # of half the mouth's width: where rounded lips begin to meet, and where they do
 PASSES, TOLERANCE_MM = 3, 0.1  # corrections are repeated while bending leaves more than this
 LIFT_GAIN = 1.6  # corrections of lids are multiplied by it, because regularised least squares fall short
 LID_MM = 1.2  # thickness of a lid: skin that is nearer to the eyeball at rest never sinks further
@@ -150,20 +151,26 @@ class ContactSolver:
         find_gaps(self._opening[0], self._opening[4])
         close_nearly(self._opening[4], np.ones(columns) if contact.cling else corner_fade(columns))
         self.push = np.zeros(4 * columns * profiles[2] if lids else 2 * columns)
-        self._rows = rows
+        self._rows, self._round, self._ends = rows, 0.0, np.zeros(columns)
+        self._outer = np.zeros(columns) if lids else outer_columns(self._opening[0])
         form = np.array([OVERLAP_MM[lids], SOFT_MM, rows, columns, profiles[2]], np.float64)
-        arrays = [*self._sides.arrays, *self._opening, self._apart, self.push, form]
+        arrays = [*self._sides.arrays, *self._opening, self._apart, self.push, form, self._ends]
         self._kept, self._bound = arrays, make_table(dict(zip((*NAMES, *SIDES), arrays, strict=True)))
 
-    def apply(self, axis: Floats, points: Floats, seal: float = 0.0) -> Floats:
+    def apply(self, axis: Floats, points: Floats, seal: float = 0.0, rounding: float = 0.0) -> Floats:
         """Correct control points (n, 3) in place; return what :meth:`Follower.apply` takes, overwritten by each
         call.
 
         For lips that is the overlap (2 k,) in mm that was found in each column, for lids how far their samples (2 k m,)
         slid and how far they were lifted. ``axis (3,)`` is where the eye looks; ``seal``, 0..1, how
-        firmly lips stay together. Where neither the points near the opening nor the eye nor the seal have changed, the
+        firmly lips stay together; ``rounding``, 0..1, how firmly they do towards the corners, so that what is open
+        between them is round. Where neither the points near the opening nor the eye nor these two have changed, the
         last answer is used again.
         """
+        if rounding != self._round:
+            self._round = rounding
+            np.multiply(rounding, self._outer, out=self._ends)
+            self._sides.work[-1][:] = np.nan  # no answer is known for these ends
         self.passes = part_bound(self._bound, points, axis, seal, PASSES, TOLERANCE_MM)
         return self.push
 
@@ -234,6 +241,13 @@ def close_nearly(gaps: Floats, firm: Floats) -> None:
     """
     if gaps.max() < NEARLY_MM:
         gaps[:] = (1.0 - firm) * gaps + firm * np.minimum(gaps, -HIDDEN_MM)  # exactly the latter where firm is 1
+
+
+def outer_columns(profiles: Floats) -> Floats:
+    """Return (k,): 1 at the corners of lips whose ``profiles (2, k, m, 3)`` at rest are given, 0 in the middle."""
+    x = profiles[..., 0].mean(axis=(0, 2))
+    out: Floats = smoothstep(np.abs(x - 0.5 * (x[0] + x[-1])) / (0.5 * np.ptp(x)), *ROUND_FROM_TO)
+    return out
 
 
 def corner_fade(columns: int) -> Floats:

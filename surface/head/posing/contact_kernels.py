@@ -280,16 +280,18 @@ def find_gaps(samples: Floats, gaps: Floats) -> None:
 
 
 @kernel
-def find_closing(samples: Floats, seal: float, least: Floats, wanted: Floats, first: bool, push: Floats) -> float:
+def find_closing(
+    samples: Floats, seal: float, ends: Floats, least: Floats, wanted: Floats, first: bool, push: Floats
+) -> float:
     """Return how far the sides of an opening must come together, ``push (2, k)``, not above 0, so that ``seal`` of what
-    it stands open beyond ``least (2, k)`` closes; ``wanted (2, k)`` is where that ends, set at the ``first`` call.
-    Returns the farthest."""
+    it stands open beyond ``least (2, k)`` closes, or in each column ``ends (k,)`` of it where that is more; ``wanted
+    (2, k)`` is where that ends, set at the ``first`` call. Returns the farthest."""
     most = 0.0
     find_gaps(samples, push)
     for side in range(2):
         for k in range(push.shape[1]):
             if first:
-                wanted[side, k] = push[side, k] - seal * max(push[side, k] - least[side, k], 0.0)
+                wanted[side, k] = push[side, k] - max(seal, ends[k]) * max(push[side, k] - least[side, k], 0.0)
             push[side, k] = min(wanted[side, k] - push[side, k], 0.0)
             most = max(most, -push[side, k])
     return most

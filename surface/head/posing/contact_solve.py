@@ -43,7 +43,7 @@ NAMES = (
 )  # fmt: skip
 """The arrays of a clearance in the order of its table; ``ball (5,)`` float64 is the eye's centre, its radius and the
 gain of lifts."""
-SIDES = ("before", "profiles", "overlap", "answer", "rest", "wanted", "apart", "push", "form")
+SIDES = ("before", "profiles", "overlap", "answer", "rest", "wanted", "apart", "push", "form", "ends")
 """The arrays that follow in the table of a contact: its opening, as :func:`part_sides` takes it, and ``form (5,)``
 float64: ``press``, ``soft`` and ``rows`` there, then columns of a side and rows of a profile."""
 SEAL_PASSES = 2  # of bringing sides together: the second closes what bending left open
@@ -127,7 +127,7 @@ def part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, w
 
     Samples are placed again after it, and profiles of lids traced."""
     own, radius, local = sampling[4], limits[3], work[0]
-    _, profiles, overlap, _, _, _ = opening
+    profiles, overlap = opening[1], opening[2]
     error, around = 0.0, radius > 0.0
     if around:
         error = lift_once(axis, 0.0, sampling, limits, work)
@@ -148,12 +148,13 @@ def part_once(axis, press, soft, rows, apart, opening, push, sampling, limits, w
 
 @kernel
 def close_sides(seal, passes, tolerance, rows, apart, opening, push, sampling, work):
-    """Bring the placed sides of an opening together by ``seal``, 0..1; samples are placed again after it."""
+    """Bring the placed sides of an opening together by ``seal``, 0..1, or by its ``ends`` where they are more; samples
+    are placed again after it."""
     own, local = sampling[4], work[0]
-    _, profiles, overlap, _, least, wanted = opening
+    _, profiles, overlap, _, least, wanted, ends = opening
     for k in range(passes):
         trace_profiles(work[4], rows, 0.0, work[5], profiles)
-        if find_closing(profiles, seal, least, wanted, k == 0, overlap) < tolerance:
+        if find_closing(profiles, seal, ends, least, wanted, k == 0, overlap) < tolerance:
             break
         push += overlap.ravel()
         move_points(own, overlap.ravel(), apart, np.zeros(3), 0.0, False, local)
@@ -172,18 +173,19 @@ def part_sides(
     press, soft : as in :func:`.contact_kernels.find_overlap`; rows : samples of a column.
     apart : (2 c, k) how far the moved points go up where the sides of a column part by 1.
     opening : before, profiles (2, c, m, 3), overlap (2, c), the answer (k, 3), see :func:`answer_with`, gaps at rest
-        (2, c), and room for those that are wanted (2, c); all but those at rest are overwritten.
+        (2, c), room for those that are wanted (2, c), and ends (c,), by how much of it each column closes at least; all
+        but those at rest and ends are overwritten.
     push : what :meth:`.contact.ContactSolver.apply` returns.
     """
     near, _, _, _, own, watched, _ = sampling
     local, found, looked, radius = work[0], work[1], work[7], limits[3]
-    before, profiles, _, answer, _, _ = opening
+    before, profiles, answer, ends = opening[0], opening[1], opening[3], opening[6]
     gather_near(points, near, eye, local)
     done = 0
     if not is_known(watched, local, axis, seal, found, looked):
         push[:] = 0.0
         place_all(radius > 0.0, sampling, work)
-        if seal > 0.0 and radius <= 0.0:
+        if radius <= 0.0 and max(seal, ends.max()) > 0.0:
             close_sides(seal, SEAL_PASSES, tolerance, rows, apart, opening, push, sampling, work)
         if radius > 0.0:
             trace_profiles(work[4], rows, radius, work[5], before)
@@ -260,6 +262,7 @@ def part_bound(table, points, axis, seal, passes, tolerance):
         shaped(table, first, profiles, np.float64), shaped(table, first + 1, profiles, np.float64),
         shaped(table, first + 2, sides, np.float64), wide(table, first + 3, 3, np.float64),
         shaped(table, first + 4, sides, np.float64), shaped(table, first + 5, sides, np.float64),
+        flat(table, first + 9, np.float64),
     )  # fmt: skip
     apart = shaped(table, first + 6, (2 * columns, moved), np.float64)
     return part_sides(

@@ -117,9 +117,9 @@ class SkinRig:
     def apply_contacts(self, pose: Pose, points: Floats) -> None:
         """Correct control points (n, 3), moved by everything else, at the part's own contacts and at those it follows;
         corrections at its own are put into ``pose.pushes``."""
-        for solver, seal in zip(self._solvers, self._seal_amounts(pose), strict=True):
+        for solver, driver, seal in zip(self._solvers, self._seals, self._seal_amounts(pose), strict=True):
             axis = _axis_of(pose, max(solver.contact.eye, 0))
-            pose.pushes[solver.contact.name] = solver.apply(axis, points, seal)
+            pose.pushes[solver.contact.name] = solver.apply(axis, points, seal, driver.rounding(pose.shapes))
             if solver.contact.eye < 0:
                 pose.lip = solver.lower
         for name, follower in self._followers:
@@ -134,7 +134,7 @@ class SkinRig:
         """Return everything in a pose that the part's points depend on."""
         jaw = (pose.jaw, pose.closed) if self._swings else ()
         gaze = pose.gaze.tobytes() if self._solvers or self._clearances else b""
-        seals = self._seal_amounts(pose)
+        seals = [*self._seal_amounts(pose), *(driver.rounding(pose.shapes) for driver in self._seals)]
         pushes = (pose.pushes[name].tobytes() for name, _ in self._followers if name in pose.pushes)
         rests = self._rest is not None and self._rest.share(pose) > 0.0
         rest = (pose.lip.tobytes(), motion_key("jaw", self._head, pose)) if rests else ()

@@ -55,3 +55,18 @@ def test_a_seal_opens_smoothly_with_the_greater_side():
     assert driver.amount(shapes(mouthUpperUpLeft=0.4, mouthUpperUpRight=0.4)) == 1.0  # sides do not add up
     assert driver.amount(shapes(mouthUpperUpLeft=1.0, mouthPucker=0.8)) == pytest.approx(0.5)
     assert SealDriver(None).amount(shapes(jawOpen=0.1)) == 0.0
+
+
+def test_lips_are_rounded_by_a_pucker_that_keeps_them_together() -> None:
+    driver = SealDriver(Seal({"jawOpen": 3.6, "mouthPucker": -0.35}, 0.45, 1.0))
+    assert driver.rounding(shapes(jawOpen=1.0, mouthSmileLeft=1.0)) == 0.0
+    assert driver.rounding(shapes(mouthPucker=0.5)) == pytest.approx(0.6)
+    assert driver.rounding(shapes(mouthFunnel=0.5)) == pytest.approx(0.35)
+    assert driver.rounding(shapes(mouthPucker=1.0, mouthFunnel=1.0)) == 1.0
+    assert driver.rounding(shapes(mouthPucker=1.0, tongueOut=0.5)) == pytest.approx(0.2)
+    assert driver.rounding(shapes(mouthPucker=1.0, tongueOut=1.0)) == 0.0
+    assert driver.rounding(shapes(mouthPucker=1.0, jawOpen=0.3)) == 1.0
+    assert driver.rounding(shapes(mouthPucker=1.0, jawOpen=0.55)) == pytest.approx(0.5)
+    assert driver.rounding(shapes(mouthPucker=1.0, jawOpen=0.9)) == 0.0
+    drawn = SealDriver(Seal({"jawOpen": 3.6, "mouthPucker": 1.4}, 0.45, 1.0))  # a round open mouth by itself
+    assert drawn.rounding(shapes(mouthPucker=1.0)) == SealDriver(None).rounding(shapes(mouthPucker=1.0)) == 0.0

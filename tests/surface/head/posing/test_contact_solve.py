@@ -124,7 +124,7 @@ class Sides:
             same = side_column % COLUMNS == column % COLUMNS
             self.apart[column, same] = 0.5 * share[same]  # both sides find the same overlap
         self.opening = (np.zeros(profiles), np.zeros(profiles), np.zeros((2, COLUMNS)), np.zeros((s, 3)),
-                        np.zeros((2, COLUMNS)), np.zeros((2, COLUMNS)))  # fmt: skip
+                        np.zeros((2, COLUMNS)), np.zeros((2, COLUMNS)), np.zeros(COLUMNS))  # fmt: skip
         self.push = np.full(4 * COLUMNS * rows if radius else 2 * COLUMNS, 9.0)
 
     def part(self, *, seal: float = 0.0, passes: int = 3, axis: np.ndarray = AWAY, tolerance: float = 0.1) -> int:
@@ -201,6 +201,16 @@ def test_a_seal_closes_its_share_of_what_stands_open_beyond_rest(seal: float) ->
     np.testing.assert_allclose(sides.heights[0], 1.0 - SHARE * closed, atol=1e-5)
     np.testing.assert_allclose(sides.heights[1], -2.0 + (1.0 - SHARE) * closed, atol=1e-5)
     np.testing.assert_allclose(sides.push, -closed, atol=1e-5)
+
+
+@pytest.mark.parametrize("seal", [0.0, 0.5])
+def test_columns_whose_ends_close_more_do_so(seal: float) -> None:
+    sides = Sides(lips(1.0, -2.0))
+    ends = np.array([1.0, 0.75, 0.0, 0.25, 1.0])
+    sides.opening[6][:] = ends
+    sides.part(seal=seal)
+    closed = np.maximum(ends, seal) * 3.0
+    np.testing.assert_allclose(sides.push.reshape(2, COLUMNS), -np.tile(closed, (2, 1)), atol=1e-5)
 
 
 def test_sides_are_brought_together_twice_at_most() -> None:
