@@ -254,7 +254,8 @@ def _inner(
 ) -> Material:  # fmt: skip
     """A material inside the mouth; ``shade`` gives (m, 2): occlusion, and how much gum covers a tooth."""
 
-    fixed = {"albedo": albedo, "wrap": (wrap, 0.6 * wrap, 0.6 * wrap), "wetness": wetness}
+    two_sided = float(options.get("two_sided", False))
+    fixed = {"albedo": albedo, "wrap": (wrap, 0.6 * wrap, 0.6 * wrap), "wetness": wetness, "two_sided": two_sided}
     return Material(
         "inner",
         lambda part, theme, openings: {"shade": (shade or _bare)(part)},
