@@ -358,7 +358,7 @@ MATERIALS: dict[str, Material] = {
     "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),
     "brow": _hair("brow", (0.70, 0.46, 0.36, 1.7), 1.0),
     "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, _necked, order=3),
-    "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.42, _grooved, order=4),
+    "tongue": _inner((0.53, 0.20, 0.18), 0.4, 0.42, _grooved, order=4),
     "gums": _inner((0.57, 0.25, 0.23), 0.3, 0.20, order=5),
     "mouth": _inner((0.46, 0.16, 0.15), 0.3, 0.20, two_sided=True, order=6),
 }

@@ -11,7 +11,11 @@
 #define CORNER vec3(0.60, 0.50, 0.44)   // of the light, what lips and cheek leave to teeth at the corners of the mouth
 #define CORNER_AT vec2(0.45, 1.0)       // of the way there: where they begin to shade them, and where they do
 #define BEHIND vec3(0.80, 0.70, 0.64)    // of the light, what the tongue leaves to the inner sides of teeth far back
+#define WIDE_MM2 vec2(200.0, 900.0)     // of the lips' opening: less light finds its way to them through a narrow one
+#define NARROW 0.62
 #define TONGUE_WET 0.35                  // nothing but a tongue is as wet
+#define MIRROR 16.0                     // how sharp the opening of the mouth is mirrored
+#define WET 0.32                        // and how bright
 #define BEHIND_MM vec2(2.0, 22.0)       // behind the lips: where it begins to lie before them, and where it does
 
 uniform mat4 view_projection;
@@ -60,7 +64,8 @@ void main() {
     float inwards = teeth * smoothstep(0.0, 0.5, -dot(n, outwards));
     float behind = teeth * max(deep, inwards * smoothstep(BEHIND_MM.x, BEHIND_MM.y, -past));
     vec3 own = mix(mix(albedo, GUM, shade.y), WALLS, max(0.06 * inwards, 0.08 * behind));
-    n = normalize(mix(n, out_of, 0.55 * deep));
+    vec3 own_normal = n;
+    n = normalize(mix(n, out_of, (wetness > TONGUE_WET ? 0.4 : 0.55) * deep));
     vec3 tint = mix(vec3(1.0), ROUND_WALLS, max(deep, inwards));
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)
         + fill_colour * wrapped(dot(n, fill_direction), wrap) + 1.6 * ambient(n);
@@ -76,11 +81,14 @@ void main() {
     float before = step(0.2, albedo.g) * (1.0 - inwards) * (1.0 - deep);
     vec3 bounce = mix(0.5 * (own + WALLS), NEIGHBOURS, 0.9 * max(teeth * (1.0 - 0.4 * inwards), 0.8 * before));
     vec3 arrives = reach / (reach + (1.0 - reach) * (1.0 - 0.9 * bounce));
-    arrives *= mix(vec3(1.0), mix(CREVICE, vec3(1.0), smoothstep(0.0, OPEN_SHARE, occlusion)), teeth * (1.0 - 0.7 * max(behind, inwards)));
-    arrives *= mix(vec3(1.0), BEHIND, behind);
+    arrives *= mix(vec3(1.0), mix(CREVICE, vec3(1.0), smoothstep(0.0, OPEN_SHARE, occlusion)), teeth * (1.0 - max(0.5 * behind, 0.7 * inwards)));
+    arrives *= mix(vec3(1.0), BEHIND * mix(NARROW, 1.0, smoothstep(WIDE_MM2.x, WIDE_MM2.y, area)), behind);
     float sideways = (1.0 - deep) * abs(dot(away, side)) / length(opening_side);
     arrives *= mix(vec3(1.0), CORNER, teeth * smoothstep(CORNER_AT.x, CORNER_AT.y, sideways));
     float nh = dot(n, normalize(key_direction + v));
     float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach * (1.0 - behind);  // else far teeth glitter
+    // What is wet mirrors the opening of the mouth, through which all light comes.
+    float mirrored = lobe(dot(own_normal, normalize(normalize(opening_centre - position) + v)), MIRROR);
+    shine += wetness * step(TONGUE_WET, wetness) * WET * mirrored * occlusion * (1.0 - smoothstep(-14.0, -4.0, past));
     v_colour = encode(own * tint * light * arrives + shine * key_colour);
 }
