@@ -17,13 +17,19 @@ from surface.dcp import DCPSurface
 from surface.fit.features.tooth_rows import row_order
 
 STEP_MM = 0.5  # of the tables of a row, along it and in height
-FLANK_MM, FLANK_SMOOTH = 0.6, 2.0  # how near samples count for a place of such a table, and smoothing along it, in steps
+FLANK_MM, FLANK_SMOOTH = (
+    0.6,
+    2.0,
+)  # how near samples count for a place of such a table, and smoothing along it, in steps
 ROOT_WIDE = 5  # steps: below the necks gum goes over the most that a root reaches inwards within so many
 CROWN_MM = 4.2, 6.4  # of a crown that is free inside, from its tip: of a molar, and of a front tooth
 THICK_MM = 8.5, 6.2  # how thick they are
 PAPILLA_MM = 3.0  # below the tips, where the gum between two teeth ends
 MOST_MM = 5.0  # no more than this it is lifted
-LIFTED = -3.5, -1.5  # mm inwards of the row's middle: what lies further outside stays, what lies further inside is lifted
+LIFTED = (
+    -3.5,
+    -1.5,
+)  # mm inwards of the row's middle: what lies further outside stays, what lies further inside is lifted
 DEEP_MM = 8.0  # below the lifted edge, where the gum stays
 UNDER_MM, OVER_MM = 0.3, 0.8  # how far the gum lies inside a tooth above its neck, and on it below
 SOFT_MM = 1.0  # over which it comes out of the tooth there

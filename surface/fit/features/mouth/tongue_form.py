@@ -1,5 +1,8 @@
-"""Give a fitted tongue a round back with a shallow groove: as a scan of a tongue at the palate has it, its back is
-pressed flat, with a deep furrow between two humps, which seen from the front of an open mouth look like a flat heart."""
+"""Give a fitted tongue a round back with a shallow groove.
+
+Modelled at the palate, its back is pressed flat, with a deep furrow between two humps; seen from the front of an open
+mouth that looks like a flat heart.
+"""
 
 from __future__ import annotations
 
