@@ -22,8 +22,8 @@ FLANK_MM, FLANK_SMOOTH = (
     2.0,
 )  # how near samples count for a place of such a table, and smoothing along it, in steps
 ROOT_WIDE = 5  # steps: below the necks gum goes over the most that a root reaches inwards within so many
-CROWN_MM = 4.2, 6.4  # of a crown that is free inside, from its tip: of a molar, and of a front tooth
-THICK_MM = 8.5, 6.2  # how thick they are
+CROWN_MM = 4.0, 5.8  # of a crown that is free inside, from its tip: of a molar, and of a front tooth
+THICK_MM, TOP_MM = (7.5, 3.5), 2.0  # how thick they are so far below their tips
 PAPILLA_MM = 3.0  # below the tips, where the gum between two teeth ends
 MOST_MM = 5.0  # no more than this it is lifted
 LIFTED = (
@@ -63,8 +63,9 @@ class _Row:
         self._line = _rounded(np.vstack([ends[:1], middles, ends[1:]]))
         self._length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self._line, axis=0), axis=1))])
         placed = [self._place(t) for t in teeth]
+        thick = [_thickness(d, t[:, 1]) for (_, d), t in zip(placed, teeth, strict=True)]
         self._s = np.arange(0.0, self._length[-1], STEP_MM)
-        self._tip, self._neck = self._necks(placed, [float(t[:, 1].max()) for t in teeth])
+        self._tip, self._neck = self._necks(placed, thick, [float(t[:, 1].max()) for t in teeth])
         every = np.concatenate([np.column_stack([s, d, t[:, 1]]) for (s, d), t in zip(placed, teeth, strict=True)])
         self._y = np.arange(every[:, 2].min(), every[:, 2].max(), STEP_MM)
         inner = _inner_sides(every, self._s, self._y)
@@ -72,11 +73,12 @@ class _Row:
         self._roots = _smoothed(maximum_filter1d(inner, ROOT_WIDE, axis=0))
         self._edge = np.zeros(len(self._s))
 
-    def _necks(self, placed: Sequence[tuple[Floats, Floats]], tips: Sequence[float]) -> tuple[Floats, Floats]:
+    def _necks(
+        self, placed: Sequence[tuple[Floats, Floats]], thick: Sequence[float], tips: Sequence[float]
+    ) -> tuple[Floats, Floats]:
         """Heights of tips and of the gum's edge, (k,) along the row."""
         centre = np.array([0.5 * (s.min() + s.max()) for s, _ in placed])
-        thick = np.array([np.ptp(d) for _, d in placed])
-        free = np.interp(-thick, [-THICK_MM[0], -THICK_MM[1]], CROWN_MM)
+        free = np.interp(-np.array(thick), [-THICK_MM[0], -THICK_MM[1]], CROWN_MM)
         borders = 0.5 * (centre[1:] + centre[:-1])
         tip = np.interp(self._s, centre, tips)
         nearest = np.abs(self._s[:, None] - borders).min(axis=1)
@@ -126,6 +128,11 @@ class _Row:
         k = square.argmin(axis=1)
         slope = _unit(self._line[np.minimum(k + 1, len(self._line) - 1)] - self._line[np.maximum(k - 1, 0)])
         return k, slope
+
+
+def _thickness(inwards: Floats, height: Floats) -> float:
+    """How thick a tooth is near its tip, from samples (s,), mm."""
+    return float(np.ptp(inwards[height > height.max() - TOP_MM]))
 
 
 def _inner_sides(samples: Floats, s: Floats, y: Floats) -> Floats:
