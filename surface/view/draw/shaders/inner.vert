@@ -15,8 +15,8 @@
 #define NARROW 0.50                     // of that, what comes
 #define LINED_MM 32.0                   // from the lips' opening: nearer, the lining sees no more of it
 #define TONGUE_WET 0.35                  // nothing but a tongue is as wet
-#define MIRROR 16.0                     // how sharp the opening of the mouth is mirrored
-#define WET 0.32                        // and how bright
+#define MIRROR 40.0                     // how sharp the opening of the mouth is mirrored
+#define WET 0.34                        // and how bright
 #define BEHIND_MM vec2(2.0, 22.0)       // behind the lips: where it begins to lie before them, and where it does
 
 uniform mat4 view_projection;
