@@ -1,13 +1,14 @@
-"""Lay the gum of a row of teeth up to their necks on the inner side, towards the tongue.
+"""Lay the gum of a row of teeth up to their necks on the side that is seen.
 
 Seen into an open mouth, the inner sides of the lower side teeth show. Where the mesh's gum lies low there, their roots
-stand free, as a serrated ridge. The gum is lifted between the teeth, and laid over their inner sides up to their necks,
-which are arches: lowest in the middle of a tooth.
+stand free, as a serrated ridge; of the upper teeth the outer sides show, and dark gaps between their necks. The gum is
+lifted between the teeth, and laid over this side up to their necks, which are arches: lowest in the middle of a tooth.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
@@ -22,42 +23,62 @@ FLANK_MM, FLANK_SMOOTH = (
     2.0,
 )  # how near samples count for a place of such a table, and smoothing along it, in steps
 ROOT_WIDE = 5  # steps: below the necks gum goes over the most that a root reaches inwards within so many
-CROWN_MM = 4.0, 5.8  # of a crown that is free inside, from its tip: of a molar, and of a front tooth
 THICK_MM, TOP_MM = (7.5, 3.5), 2.0  # how thick they are so far below their tips
-PAPILLA_MM = 3.0  # below the tips, where the gum between two teeth ends
 MOST_MM = 5.0  # no more than this it is lifted
 LIFTED = (
     -3.5,
     -1.5,
 )  # mm inwards of the row's middle: what lies further outside stays, what lies further inside is lifted
 DEEP_MM = 8.0  # below the lifted edge, where the gum stays
-UNDER_MM, OVER_MM = 0.3, 0.8  # how far the gum lies inside a tooth above its neck, and on it below
+UNDER_MM = 0.3  # how far the gum lies inside a tooth above its neck
 SOFT_MM = 1.0  # over which it comes out of the tooth there
 ROOT_MM = 4.0, 9.0  # below the neck, where it begins to lie where it was, and does
 KEPT = 0.25  # weight with which control points go where the space around them goes, beside a sample's
 
 
-def laid_to_necks(points: Floats, surface: DCPSurface, uv: Floats, teeth: Sequence[Floats]) -> Floats:
-    """Return the control points (n, 3), mm, of gums below lower teeth, laid up to their necks on the inner side.
+@dataclass(frozen=True)
+class Side:
+    """A side of a row of teeth. ``crown_mm`` : of a crown that is free, from its tip, of a molar and of a front tooth;
+    ``papilla_mm`` : below the tips, where the gum between two teeth ends; ``over_mm`` : how far the gum lies on a tooth
+    below its neck; ``upper`` : tips point down."""
+
+    crown_mm: tuple[float, float]
+    papilla_mm: float
+    over_mm: float
+    upper: bool = False
+    outer: bool = False
+
+
+LOWER_INNER = Side((4.0, 5.8), 3.0, 0.8)
+UPPER_OUTER = Side((8.0, 10.3), 7.2, 0.3, upper=True, outer=True)
+
+
+def laid_to_necks(
+    points: Floats, surface: DCPSurface, uv: Floats, teeth: Sequence[Floats], side: Side = LOWER_INNER
+) -> Floats:
+    """Return the control points (n, 3), mm, of the gums of a row of teeth, laid up to their necks on one side.
 
     points : (n, 3). surface : with these points. uv : (m, 2) places all over it. teeth : samples (s, 3) of each tooth.
     Front is +z, up is y.
     """
-    row = _Row([teeth[k] for k in row_order(teeth)])
-    at = surface.evaluate(uv)
+    upright = np.array([1.0, -1.0 if side.upper else 1.0, 1.0])
+    order = row_order(teeth)  # of a row that runs the other way round, the inner side is the outer one
+    row = _Row([teeth[k] * upright for k in (order[::-1] if side.outer else order)], side)
+    at = surface.evaluate(uv) * upright
     known = np.isfinite(at).all(axis=1)
     uv, at = uv[known], at[known]
     row.find_edge(at)
     system = np.vstack([surface.basis_matrix(uv).toarray(), KEPT * np.eye(len(points))])
-    wanted = np.vstack([row.moves(at), KEPT * row.moves(points)])
-    laid: Floats = points + np.linalg.lstsq(system, wanted, rcond=None)[0]
+    wanted = np.vstack([row.moves(at), KEPT * row.moves(points * upright)])
+    laid: Floats = points + np.linalg.lstsq(system, wanted, rcond=None)[0] * upright
     return laid
 
 
 class _Row:
     """A row of teeth along the line through their middles: tips, necks and inner sides by length and height."""
 
-    def __init__(self, teeth: Sequence[Floats]) -> None:
+    def __init__(self, teeth: Sequence[Floats], side: Side) -> None:
+        self._side = side
         middles = np.array([0.5 * (t.min(axis=0) + t.max(axis=0)) for t in teeth])[:, [0, 2]]
         ends = middles[[0, -1]] + 15.0 * _unit(middles[[0, -1]] - middles[[1, -2]])
         self._line = _rounded(np.vstack([ends[:1], middles, ends[1:]]))
@@ -78,18 +99,18 @@ class _Row:
     ) -> tuple[Floats, Floats]:
         """Heights of tips and of the gum's edge, (k,) along the row."""
         centre = np.array([0.5 * (s.min() + s.max()) for s, _ in placed])
-        free = np.interp(-np.array(thick), [-THICK_MM[0], -THICK_MM[1]], CROWN_MM)
+        free = np.interp(-np.array(thick), [-THICK_MM[0], -THICK_MM[1]], self._side.crown_mm)
         borders = 0.5 * (centre[1:] + centre[:-1])
         tip = np.interp(self._s, centre, tips)
         nearest = np.abs(self._s[:, None] - borders).min(axis=1)
         half = np.interp(self._s, centre, [0.5 * float(np.ptp(s)) for s, _ in placed])
-        arch = np.sin(0.5 * np.pi * np.clip(nearest / half, 0.0, 1.0)) ** 0.7
-        return tip, tip - PAPILLA_MM - (np.interp(self._s, centre, free) - PAPILLA_MM) * arch
+        arch = np.sin(0.5 * np.pi * np.clip(nearest / half, 0.0, 1.0)) ** 0.5
+        return tip, tip - self._side.papilla_mm - (np.interp(self._s, centre, free) - self._side.papilla_mm) * arch
 
     def find_edge(self, gum: Floats) -> None:
         """Find how high gums lie in the middle of the row, from samples (m, 3) of them."""
         s, d = self._place(gum)
-        low = self._tip - PAPILLA_MM
+        low = self._tip - self._side.papilla_mm
         for k, at in enumerate(self._s):
             near = (np.abs(s - at) < 1.5) & (np.abs(d) < 1.5)
             self._edge[k] = gum[near, 1].max() if near.any() else low[k]
@@ -99,12 +120,13 @@ class _Row:
         """(m, 3) where places (m, 3) of the gum go, mm."""
         s, d = self._place(at)
         tip, neck, edge = (np.interp(s, self._s, row) for row in (self._tip, self._neck, self._edge))
-        lift = np.clip(tip - PAPILLA_MM - edge, 0.0, MOST_MM)
+        lift = np.clip(tip - self._side.papilla_mm - edge, 0.0, MOST_MM)
         lift *= _eased(d, *LIFTED) * _eased(at[:, 1] - edge, -DEEP_MM, 0.0)
         y = at[:, 1] + lift
         below = neck - y
         out = _eased(below, -SOFT_MM, SOFT_MM)
-        side = (1.0 - out) * (self._at(self._inner, s, y) - UNDER_MM) + out * (self._at(self._roots, s, y) + OVER_MM)
+        crown, root = self._at(self._inner, s, y) - UNDER_MM, self._at(self._roots, s, y) + self._side.over_mm
+        side = (1.0 - out) * crown + out * root
         inwards = np.clip(side - d, 0.0, None) * _eased(d, -0.5, 1.0) * _eased(-below, -ROOT_MM[1], -ROOT_MM[0])
         _, slope = self._nearest(at)
         return np.column_stack([slope[:, 1] * inwards, lift, -slope[:, 0] * inwards])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.features.mouth.gum_lines import laid_to_necks
+from surface.fit.features.mouth.gum_lines import LOWER_INNER, UPPER_OUTER, laid_to_necks
 from surface.fit.features.mouth.tongue_form import rounded_tongue
 from surface.fit.features.rigging import tongue_groups
 from surface.fit.features.tooth_rows import tooth_samples
@@ -32,7 +32,8 @@ def _redrawn(part: PartData, head: HeadData, recipe: Recipe) -> PartData:
     teeth = [crown for row in rows for crown in tooth_samples(make_surface(row), row.loops)]
     if not teeth:
         return part
-    return replace(part, points=laid_to_necks(part.points, make_surface(part), _places(part), teeth))
+    side = LOWER_INNER if part.follows == "jaw" else UPPER_OUTER
+    return replace(part, points=laid_to_necks(part.points, make_surface(part), _places(part), teeth, side))
 
 
 def _with_round_tongue(part: PartData, head: HeadData, recipe: Recipe) -> PartData:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from surface.dcp import DCPSurface
-from surface.fit.features.mouth.gum_lines import CROWN_MM, PAPILLA_MM, laid_to_necks
+from surface.fit.features.mouth.gum_lines import LOWER_INNER, laid_to_necks
 
 TEETH, ARCH_MM, TIP_MM = 14, 30.0, -30.0
 HALF_MM, HIGH_MM = 4.2, 11.0  # of a tooth: half its width and thickness, its height
@@ -57,14 +57,14 @@ def inwards(at: np.ndarray, angle: float) -> tuple[np.ndarray, np.ndarray]:
 def test_roots_are_covered_and_crowns_are_free(strips: tuple[np.ndarray, np.ndarray], k: int) -> None:
     (bare, _), (deep, low) = (inwards(at, ANGLES[k]) for at in strips)
     assert bare.max() < HALF_MM, "before, all of the tooth stands free"
-    assert (deep[(low > CROWN_MM[1] + 1.0) & (low < CROWN_MM[1] + 2.5)] > HALF_MM).all()
-    assert (deep[low < CROWN_MM[0] - 1.0] < HALF_MM).all()
+    assert (deep[(low > LOWER_INNER.crown_mm[1] + 1.0) & (low < LOWER_INNER.crown_mm[1] + 2.5)] > HALF_MM).all()
+    assert (deep[low < LOWER_INNER.crown_mm[0] - 1.0] < HALF_MM).all()
 
 
 def test_between_teeth_the_gum_ends_higher(strips: tuple[np.ndarray, np.ndarray]) -> None:
     before, after = (inwards(at, 0.5 * (ANGLES[5] + ANGLES[6]))[1].min() for at in strips)
-    assert before > PAPILLA_MM + 2.0
-    assert after == pytest.approx(PAPILLA_MM, abs=0.6)
+    assert before > LOWER_INNER.papilla_mm + 2.0
+    assert after == pytest.approx(LOWER_INNER.papilla_mm, abs=0.6)
 
 
 def test_what_lies_far_below_the_necks_stays(strips: tuple[np.ndarray, np.ndarray]) -> None:
