@@ -18,17 +18,12 @@ from surface.dcp import DCPSurface
 from surface.fit.features.tooth_rows import row_order
 
 STEP_MM = 0.5  # of the tables of a row, along it and in height
-FLANK_MM, FLANK_SMOOTH = (
-    0.6,
-    2.0,
-)  # how near samples count for a place of such a table, and smoothing along it, in steps
+FLANK_MM, FLANK_SMOOTH = 0.6, 2.0  # how near samples count for a place of a table; smoothing along it, in steps
 ROOT_WIDE = 5  # steps: below the necks gum goes over the most that a root reaches inwards within so many
 THICK_MM, TOP_MM = (7.5, 3.5), 2.0  # how thick they are so far below their tips
+ROUND = 0.5  # power of a sine: less is a flatter arch with steeper flanks
 MOST_MM = 5.0  # no more than this it is lifted
-LIFTED = (
-    -3.5,
-    -1.5,
-)  # mm inwards of the row's middle: what lies further outside stays, what lies further inside is lifted
+LIFTED = -3.5, -1.5  # mm inwards of the row's middle: what lies further out stays, what lies further in is lifted
 DEEP_MM = 8.0  # below the lifted edge, where the gum stays
 UNDER_MM = 0.3  # how far the gum lies inside a tooth above its neck
 SOFT_MM = 1.0  # over which it comes out of the tooth there
@@ -104,7 +99,7 @@ class _Row:
         tip = np.interp(self._s, centre, tips)
         nearest = np.abs(self._s[:, None] - borders).min(axis=1)
         half = np.interp(self._s, centre, [0.5 * float(np.ptp(s)) for s, _ in placed])
-        arch = np.sin(0.5 * np.pi * np.clip(nearest / half, 0.0, 1.0)) ** 0.5
+        arch = np.sin(0.5 * np.pi * np.clip(nearest / half, 0.0, 1.0)) ** ROUND
         return tip, tip - self._side.papilla_mm - (np.interp(self._s, centre, free) - self._side.papilla_mm) * arch
 
     def find_edge(self, gum: Floats) -> None:
@@ -117,19 +112,22 @@ class _Row:
         self._edge = gaussian_filter1d(self._edge, FLANK_SMOOTH)
 
     def moves(self, at: Floats) -> Floats:
-        """(m, 3) where places (m, 3) of the gum go, mm."""
+        """(m, 3) by how much places (m, 3) of the gum move, mm."""
         s, d = self._place(at)
         tip, neck, edge = (np.interp(s, self._s, row) for row in (self._tip, self._neck, self._edge))
         lift = np.clip(tip - self._side.papilla_mm - edge, 0.0, MOST_MM)
         lift *= _eased(d, *LIFTED) * _eased(at[:, 1] - edge, -DEEP_MM, 0.0)
-        y = at[:, 1] + lift
+        inwards = self._inwards(s, d, at[:, 1] + lift, neck)
+        _, slope = self._nearest(at)
+        return np.column_stack([slope[:, 1] * inwards, lift, -slope[:, 0] * inwards])
+
+    def _inwards(self, s: Floats, d: Floats, y: Floats, neck: Floats) -> Floats:
+        """How much further inwards (m,) places of the gum go, mm, from their lengths, distances, heights and necks."""
         below = neck - y
         out = _eased(below, -SOFT_MM, SOFT_MM)
         crown, root = self._at(self._inner, s, y) - UNDER_MM, self._at(self._roots, s, y) + self._side.over_mm
         side = (1.0 - out) * crown + out * root
-        inwards = np.clip(side - d, 0.0, None) * _eased(d, -0.5, 1.0) * _eased(-below, -ROOT_MM[1], -ROOT_MM[0])
-        _, slope = self._nearest(at)
-        return np.column_stack([slope[:, 1] * inwards, lift, -slope[:, 0] * inwards])
+        return np.clip(side - d, 0.0, None) * _eased(d, -0.5, 1.0) * _eased(-below, -ROOT_MM[1], -ROOT_MM[0])
 
     def _at(self, table: Floats, s: Floats, y: Floats) -> Floats:
         """The values (m,) of a table (k, h) at lengths and heights (m,)."""
