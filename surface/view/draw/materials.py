@@ -11,6 +11,7 @@ import numpy as np
 from surface.base.arrays import median
 from surface.mesh.strips import lower_strips, strip_uv
 from surface.view.draw.programs import build
+from surface.view.draw.rims import rim_shade
 from surface.view.draw.tooth_necks import tooth_necks
 from surface.view.scene.openings import LID_POINTS, Openings
 from surface.view.scene.parts import ViewPart
@@ -279,6 +280,13 @@ def _necked(part: ViewPart) -> np.ndarray:
     return np.hstack([_occlusion(part), necks[:, None]])
 
 
+def _lined(part: ViewPart) -> np.ndarray:
+    """(m, 2): occlusion of what lines a mouth, which lies in the lips' shade at its rim, and no gum."""
+    shade = _bare(part)
+    shade[:, 0] *= rim_shade(np.asarray(part.vertices, np.float64), part.triangles)
+    return shade
+
+
 def _grooved(part: ViewPart) -> np.ndarray:
     """(m, 2): occlusion of a tongue, with a furrow along the middle of its upper side, and no gum."""
     across = np.asarray(part.vertices[:, 0]) - median(part.vertices[:, 0])
@@ -360,7 +368,7 @@ MATERIALS: dict[str, Material] = {
     "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, _necked, order=3),
     "tongue": _inner((0.53, 0.20, 0.18), 0.4, 0.42, _grooved, order=4),
     "gums": _inner((0.57, 0.25, 0.23), 0.3, 0.20, order=5),
-    "mouth": _inner((0.46, 0.16, 0.15), 0.3, 0.20, two_sided=True, order=6),
+    "mouth": _inner((0.46, 0.16, 0.15), 0.3, 0.20, _lined, two_sided=True, order=6),
 }
 
 

@@ -12,8 +12,7 @@
 #define CORNER_AT vec2(0.45, 1.0)       // of the way there: where they begin to shade them, and where they do
 #define BEHIND vec3(0.80, 0.70, 0.64)    // of the light, what the tongue leaves to the inner sides of teeth far back
 #define WIDE_MM2 vec2(200.0, 900.0)     // of the lips' opening: through a narrow one less of it comes to them
-#define NARROW 0.50                     // of that, what comes
-#define LINED_MM 32.0                   // from the lips' opening: nearer, the lining sees no more of it
+#define NARROW vec3(0.62, 0.49, 0.43)   // of that, what comes
 #define TONGUE_WET 0.35                  // nothing but a tongue is as wet
 #define MIRROR 40.0                     // how sharp the opening of the mouth is mirrored
 #define WET 0.34                        // and how bright
@@ -42,7 +41,6 @@ float daylight(vec3 n) {
     vec3 towards = opening_side * clamp(dot(off, opening_side) / dot(opening_side, opening_side), -1.0, 1.0) - off;
     float square = dot(towards, towards) + 1e-3;
     vec3 direction = towards * inversesqrt(square);
-    square = max(square, two_sided * LINED_MM * LINED_MM);  // the lips hide the opening from the lining beside them
     float facing = abs(dot(opening_area / area, direction));
     float cosine = clamp(0.35 + 0.65 * dot(n, direction), 0.0, 1.0);
     return area * cosine * (0.3 + 0.7 * facing) / (2.0 * square + area);
@@ -85,7 +83,7 @@ void main() {
     vec3 arrives = reach / (reach + (1.0 - reach) * (1.0 - 0.9 * bounce));
     float creviced = teeth * (1.0 - max(0.35 * behind, 0.5 * inwards));
     arrives *= mix(vec3(1.0), mix(CREVICE, vec3(1.0), smoothstep(0.0, OPEN_SHARE, occlusion)), creviced);
-    arrives *= mix(vec3(1.0), BEHIND * mix(NARROW, 1.0, smoothstep(WIDE_MM2.x, WIDE_MM2.y, area)), behind);
+    arrives *= mix(vec3(1.0), BEHIND * mix(NARROW, vec3(1.0), smoothstep(WIDE_MM2.x, WIDE_MM2.y, area)), behind);
     float sideways = (1.0 - deep) * abs(dot(away, side)) / length(opening_side);
     arrives *= mix(vec3(1.0), CORNER, teeth * smoothstep(CORNER_AT.x, CORNER_AT.y, sideways));
     float nh = dot(n, normalize(key_direction + v));
