@@ -28,6 +28,7 @@ DEEP_MM = 8.0  # below the lifted edge, where the gum stays
 UNDER_MM = 0.3  # how far the gum lies inside a tooth above its neck
 SOFT_MM = 1.0  # over which it comes out of the tooth there
 ROOT_MM = 4.0, 9.0  # below the neck, where it begins to lie where it was, and does
+SEWN = 5.0  # weight with which borders meet, beside a sample's
 KEPT = 0.25  # weight with which control points go where the space around them goes, beside a sample's
 
 
@@ -49,12 +50,13 @@ UPPER_OUTER = Side((8.0, 10.3), 7.2, 0.3, upper=True, outer=True)
 
 
 def laid_to_necks(
-    points: Floats, surface: DCPSurface, uv: Floats, teeth: Sequence[Floats], side: Side = LOWER_INNER
-) -> Floats:
+    points: Floats, surface: DCPSurface, uv: Floats, teeth: Sequence[Floats], side: Side = LOWER_INNER,
+    seams: Sequence[tuple[Floats, Floats]] = (),
+) -> Floats:  # fmt: skip
     """Return the control points (n, 3), mm, of the gums of a row of teeth, laid up to their necks on one side.
 
     points : (n, 3). surface : with these points. uv : (m, 2) places all over it. teeth : samples (s, 3) of each tooth.
-    Front is +z, up is y.
+    seams : places (k, 2) of one border and of the other one, which are to meet. Front is +z, up is y.
     """
     upright = np.array([1.0, -1.0 if side.upper else 1.0, 1.0])
     order = row_order(teeth)  # of a row that runs the other way round, the inner side is the outer one
@@ -63,8 +65,10 @@ def laid_to_necks(
     known = np.isfinite(at).all(axis=1)
     uv, at = uv[known], at[known]
     row.find_edge(at)
-    system = np.vstack([surface.basis_matrix(uv).toarray(), KEPT * np.eye(len(points))])
-    wanted = np.vstack([row.moves(at), KEPT * row.moves(points * upright)])
+    apart = [(surface.basis_matrix(a) - surface.basis_matrix(b)).toarray() for a, b in seams]
+    system = np.vstack([surface.basis_matrix(uv).toarray(), KEPT * np.eye(len(points)), *(SEWN * b for b in apart)])
+    away = [-SEWN * b @ (points * upright) for b in apart]
+    wanted = np.vstack([row.moves(at), KEPT * row.moves(points * upright), *away])
     laid: Floats = points + np.linalg.lstsq(system, wanted, rcond=None)[0] * upright
     return laid
 

@@ -33,7 +33,8 @@ def _redrawn(part: PartData, head: HeadData, recipe: Recipe) -> PartData:
     if not teeth:
         return part
     side = LOWER_INNER if part.follows == "jaw" else UPPER_OUTER
-    return replace(part, points=laid_to_necks(part.points, make_surface(part), _places(part), teeth, side))
+    seams = [(s.uv_a, s.uv_b) for s in head.seams if s.part_a == s.part_b == part.name]
+    return replace(part, points=laid_to_necks(part.points, make_surface(part), _places(part), teeth, side, seams))
 
 
 def _with_round_tongue(part: PartData, head: HeadData, recipe: Recipe) -> PartData:

@@ -14,6 +14,7 @@ from surface.fit.features.rigging import DROOP
 from surface.fit.points.recipe import RECIPES, Recipe, _part
 from surface.head import load_data
 from surface.head.model.data import HeadData
+from surface.head.model.meshes import make_surface
 
 HEAD = Path(__file__).parents[5] / "configs" / "heads" / "ict"
 
@@ -59,3 +60,14 @@ def test_a_tongue_comes_out_to_where_it_came_out_before(head: HeadData) -> None:
     for name in rest:
         before, now = (next(g for g in p.groups if g.name == name) for p in (old, new))
         np.testing.assert_array_equal(before.moves, now.moves)
+
+
+@pytest.mark.parametrize("name", ["gums_upper", "gums_lower"])
+def test_borders_of_gums_still_meet(head: HeadData, name: str) -> None:
+    after = redrawn_mouth(head, recipe(name))
+    apart = []
+    for one in (head, after):
+        surface = make_surface(next(p for p in one.parts if p.name == name))
+        own = [s for s in one.seams if s.part_a == s.part_b == name]
+        apart.append(max(np.abs(surface.evaluate(s.uv_a) - surface.evaluate(s.uv_b)).max() for s in own))
+    assert apart[1] < max(apart[0], 0.5) + 0.1
