@@ -61,7 +61,8 @@ def welded(vertices: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.
     size = steps.max(axis=0) + 1
     key = (steps[:, 0] * size[1] + steps[:, 1]) * size[2] + steps[:, 2]  # sorting rows takes ten times as long
     _, first, same = np.unique(key, return_index=True, return_inverse=True)
-    return same, steps[first] * _SAME_MM
+    places: NDArray[np.float64] = _SAME_MM * steps[first].astype(np.float64)
+    return same, places
 
 
 # Both are short here: to import the same from scipy takes longer than all else that is done before the first picture is
