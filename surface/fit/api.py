@@ -26,6 +26,7 @@ from surface.fit.features.finish import finish_head
 from surface.fit.features.generic import Plan, make_plan
 from surface.fit.features.joins import find_seams
 from surface.fit.features.levelled import level_seams
+from surface.fit.features.mouth.redrawn import redrawn_mouth
 from surface.fit.features.pieces import HeadRig, eyeball_part, hair_parts, skin_part, teeth_part
 from surface.fit.features.rigging import find_jaw, take_tongue
 from surface.fit.features.wrinkles import with_deep_wrinkles
@@ -180,6 +181,7 @@ def fit_mesh(loaded: Loaded, name: str, progress: Progress, where: str = "mesh")
     head, local = localised(head, scale)
     head, dense, mended = mend_spikes(head, mesh, sources, fitted_parts, scale)
     head = with_greatest_error(head, str(dense.greatest) if dense.greatest else "")
+    head = redrawn_mouth(head, recipe)  # after all that is measured against the mesh
     notes = [*worn.notes, *loaded.notes, *plan.notes, *turned_faces(mesh), str(local), *mended]
     notes += findings(head, loaded.marks, _kinds(loaded), {one.kind for one in worn.accessories})
     notes += overlap_notes(head, MeshOverlaps(head, mesh, sources, fitted_parts, scale).depth)

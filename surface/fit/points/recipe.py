@@ -30,7 +30,8 @@ class PartRecipe:
     ``tiled`` : its islands are still to be put into tiles of their own; ``wrapped`` : one skin goes round all of them,
     and ``even`` : its samples are as dense at the rim of something flat as elsewhere;
     ``downweight_slivers`` : its faces may be of any form and size; see :func:`surface.fit.source.chart.make_chart`;
-    ``raised`` : how far it is moved upwards after the fit, mm.
+    ``raised`` : how far it is moved upwards after the fit, mm; ``redrawn`` : whether its form is redrawn then, see
+    :mod:`surface.fit.features.mouth.redrawn`.
     """
 
     name: str
@@ -44,6 +45,7 @@ class PartRecipe:
     even: bool = False
     downweight_slivers: bool = False
     raised: float = 0.0
+    redrawn: bool = False
 
     def holds(self, vertex: float) -> bool:
         """Is the vertex in one of the ranges?"""

@@ -11,6 +11,7 @@ import numpy as np
 from surface.base.arrays import median
 from surface.mesh.strips import lower_strips, strip_uv
 from surface.view.draw.programs import build
+from surface.view.draw.rims import rim_shade
 from surface.view.draw.tooth_necks import tooth_necks
 from surface.view.scene.openings import LID_POINTS, Openings
 from surface.view.scene.parts import ViewPart
@@ -254,7 +255,8 @@ def _inner(
 ) -> Material:  # fmt: skip
     """A material inside the mouth; ``shade`` gives (m, 2): occlusion, and how much gum covers a tooth."""
 
-    fixed = {"albedo": albedo, "wrap": (wrap, 0.6 * wrap, 0.6 * wrap), "wetness": wetness}
+    two_sided = float(options.get("two_sided", False))
+    fixed = {"albedo": albedo, "wrap": (wrap, 0.6 * wrap, 0.6 * wrap), "wetness": wetness, "two_sided": two_sided}
     return Material(
         "inner",
         lambda part, theme, openings: {"shade": (shade or _bare)(part)},
@@ -276,6 +278,13 @@ def _necked(part: ViewPart) -> np.ndarray:
     """(m, 2): occlusion, and the gum that covers teeth."""
     necks = tooth_necks(np.asarray(part.vertices, np.float64), part.triangles)
     return np.hstack([_occlusion(part), necks[:, None]])
+
+
+def _lined(part: ViewPart) -> np.ndarray:
+    """(m, 2): occlusion of what lines a mouth, which lies in the lips' shade at its rim, and no gum."""
+    shade = _bare(part)
+    shade[:, 0] *= rim_shade(np.asarray(part.vertices, np.float64), part.triangles)
+    return shade
 
 
 def _grooved(part: ViewPart) -> np.ndarray:
@@ -357,9 +366,9 @@ MATERIALS: dict[str, Material] = {
     "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),
     "brow": _hair("brow", (0.70, 0.46, 0.36, 1.7), 1.0),
     "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, _necked, order=3),
-    "tongue": _inner((0.50, 0.17, 0.15), 0.4, 0.42, _grooved, order=4),
+    "tongue": _inner((0.53, 0.20, 0.18), 0.4, 0.42, _grooved, order=4),
     "gums": _inner((0.57, 0.25, 0.23), 0.3, 0.20, order=5),
-    "mouth": _inner((0.46, 0.16, 0.15), 0.3, 0.20, two_sided=True, order=6),
+    "mouth": _inner((0.46, 0.16, 0.15), 0.3, 0.20, _lined, two_sided=True, order=6),
 }
 
 

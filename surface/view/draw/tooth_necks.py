@@ -21,14 +21,13 @@ def tooth_necks(vertices: NDArray[np.float64], triangles: NDArray[np.integer]) -
     """Return (m,) float32: how much gum covers each vertex (m, 3), mm, of teeth; 0 all over teeth without a border."""
     if not len(triangles):
         return np.zeros(len(vertices), np.float32)
-    same, places = _welded(vertices)
-    welded = same[triangles]
-    welded = welded[(welded != np.roll(welded, 1, axis=1)).all(axis=1)].astype(np.int32)
-    tooth = _connected(welded, len(places))
-    border = np.zeros(len(places), bool)
-    border[border_edges(welded).ravel()] = True
-    at = places * _SAME_MM
-    out = np.zeros(len(places))
+    same, at = welded(vertices)
+    joined = same[triangles]
+    joined = joined[(joined != np.roll(joined, 1, axis=1)).all(axis=1)].astype(np.int32)
+    tooth = _connected(joined, len(at))
+    border = np.zeros(len(at), bool)
+    border[border_edges(joined).ravel()] = True
+    out = np.zeros(len(at))
     for k in np.unique(tooth[border]):
         own = np.flatnonzero(tooth == k)
         out[own] = _covered(at[own], border[own])
@@ -48,21 +47,22 @@ def _covered(at: NDArray[np.float64], border: NDArray[np.bool_]) -> NDArray[np.f
     # Only what may be near enough is measured: most of a crown is far from its border.
     near = height > height[low].min() - _NECK_MM[1] * float(np.linalg.norm(along))
     away = np.full(len(at), np.inf)
-    away[near] = _distances(at[near], at[low])
+    away[near] = distances(at[near], at[low])
     share = np.clip((_NECK_MM[1] - away) / (_NECK_MM[1] - _NECK_MM[0]), 0.0, 1.0)
     faded: NDArray[np.float64] = share * share * (3.0 - 2.0 * share)
     return faded
 
 
-def _welded(vertices: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
-    """Return (m,) which place each vertex (m, 3) has, and these places (k, 3) from their least corner, in steps of
-    :data:`_SAME_MM`."""
+def welded(vertices: NDArray[np.float64]) -> tuple[NDArray[np.intp], NDArray[np.float64]]:
+    """Return (m,) which place each vertex (m, 3) has, and these places (k, 3) from their least corner, mm; vertices
+    within :data:`_SAME_MM` are one."""
     steps = np.round(vertices / _SAME_MM).astype(np.int64)
     steps -= steps.min(axis=0)
     size = steps.max(axis=0) + 1
     key = (steps[:, 0] * size[1] + steps[:, 1]) * size[2] + steps[:, 2]  # sorting rows takes ten times as long
     _, first, same = np.unique(key, return_index=True, return_inverse=True)
-    return same, steps[first].astype(np.float64)
+    places: NDArray[np.float64] = _SAME_MM * steps[first].astype(np.float64)
+    return same, places
 
 
 # Both are short here: to import the same from scipy takes longer than all else that is done before the first picture is
@@ -80,7 +80,7 @@ def _connected(triangles: NDArray[np.integer], count: int) -> NDArray[np.intp]:
     return label
 
 
-def _distances(points: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
+def distances(points: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return (n,) the distance of each point (n, 3) from the nearest of some places (m, 3)."""
     least, own = np.full(len(points), np.inf), points - places.mean(axis=0)  # near 0, where squares lose little
     for some in np.array_split(places - places.mean(axis=0), -(-len(places) * len(points) // _MAX_PAIRS)):

@@ -267,6 +267,15 @@ def test_a_part_that_cannot_be_fitted_is_left_out_by_name_and_the_face_never_is(
         assert any("brow_1: left out: it cannot be fitted" in note for note in result.report.notes) == (most == 0.0)
 
 
+@pytest.mark.slow
+def test_a_mouth_is_redrawn_in_the_head_that_is_given_back(monkeypatch):
+    monkeypatch.setattr("surface.fit.features.generic.FINEST", 2.0)
+    monkeypatch.setattr("surface.fit.features.generic.POINTS", 300)
+    monkeypatch.setattr(api, "redrawn_mouth", lambda head, recipe: replace(head, name="redrawn"))
+    mesh = slit_sheet()
+    assert fit_mesh(Loaded(mesh, map_names(mesh.names)), "me", lambda *_: None).head.name == "redrawn"
+
+
 @pytest.mark.parametrize("exported", [False, True])
 def test_lashes_of_an_exported_head_are_not_cut_into_hairs_again(monkeypatch, exported):
     """A solid lash of a drawn character stays solid when its head is exported and fitted again."""

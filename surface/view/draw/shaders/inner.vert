@@ -4,14 +4,18 @@
 #define NEIGHBOURS vec3(0.84, 0.82, 0.80)
 #define DEEP_MM vec2(12.0, 40.0)  // behind the lips: where the mouth's inside begins to be deep, and where it is
 #define ARCH_MM 45.0              // how far behind the lips the middle of the row of teeth lies
-#define ROUND_WALLS vec3(1.0, 0.92, 0.87)
+#define ROUND_WALLS vec3(1.0, 0.92, 0.84)
 #define CREVICE vec3(0.34, 0.19, 0.15)  // of the light, what is left between two teeth and at the gum
 #define OPEN_SHARE 0.55                 // of the sky that a tooth sees, from which on it is in the open
 
-#define CORNER vec3(0.54, 0.46, 0.43)   // of the light, what lips and cheek leave to teeth at the corners of the mouth
+#define CORNER vec3(0.60, 0.50, 0.44)   // of the light, what lips and cheek leave to teeth at the corners of the mouth
 #define CORNER_AT vec2(0.45, 1.0)       // of the way there: where they begin to shade them, and where they do
-#define BEHIND vec3(0.56, 0.50, 0.49)    // of the light, what the tongue leaves to the inner sides of teeth far back
+#define BEHIND vec3(0.80, 0.70, 0.64)    // of the light, what the tongue leaves to the inner sides of teeth far back
+#define WIDE_MM2 vec2(200.0, 900.0)     // of the lips' opening: through a narrow one less of it comes to them
+#define NARROW vec3(0.62, 0.49, 0.43)   // of that, what comes
 #define TONGUE_WET 0.35                  // nothing but a tongue is as wet
+#define MIRROR 40.0                     // how sharp the opening of the mouth is mirrored
+#define WET 0.34                        // and how bright
 #define BEHIND_MM vec2(2.0, 22.0)       // behind the lips: where it begins to lie before them, and where it does
 
 uniform mat4 view_projection;
@@ -22,6 +26,7 @@ uniform vec3 opening_area;   // vector area of the lips' opening, mm^2
 uniform vec3 albedo;
 uniform vec3 wrap;
 uniform float wetness;
+uniform float two_sided;     // 1 where back faces are drawn, too
 
 in vec3 position;
 in vec3 normal;
@@ -44,7 +49,8 @@ float daylight(vec3 n) {
 void main() {
     gl_Position = view_projection * vec4(position, 1.0);
     vec3 v = normalize(camera - position);
-    vec3 n = dot(normal, v) < 0.0 ? -normal : normal;
+    // Turned over where the back is seen; of what shows no back, single vertices at its outline would be dark.
+    vec3 n = normal * (1.0 - 2.0 * two_sided * step(dot(normal, v), 0.0));
     vec3 out_of = opening_area / (length(opening_area) + 1e-3);
     float past = dot(position - opening_centre, out_of);
     // Far in, light has been round the mouth's red walls and comes from everywhere.
@@ -58,12 +64,13 @@ void main() {
     float inwards = teeth * smoothstep(0.0, 0.5, -dot(n, outwards));
     float behind = teeth * max(deep, inwards * smoothstep(BEHIND_MM.x, BEHIND_MM.y, -past));
     vec3 own = mix(mix(albedo, GUM, shade.y), WALLS, max(0.06 * inwards, 0.08 * behind));
-    n = normalize(mix(n, out_of, 0.55 * deep));
+    vec3 own_normal = n;
+    n = normalize(mix(n, out_of, (wetness > TONGUE_WET ? 0.4 : 0.55) * deep));
     vec3 tint = mix(vec3(1.0), ROUND_WALLS, max(deep, inwards));
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)
         + fill_colour * wrapped(dot(n, fill_direction), wrap) + 1.6 * ambient(n);
     // A tongue past the lips is in the open.
-    float open = mix(occlusion, 1.0, max(0.5 * deep, 0.5 * teeth));
+    float open = mix(occlusion, 1.0, max(0.5 * deep, max(0.5 * teeth, 0.6 * shade.y)));
     float area = length(opening_area);
     float direct = mix(daylight(n) * open, 0.28 * area / (area + 400.0), inwards);
     // What is out lets light under itself, and the tongue is the only thing that comes out far.
@@ -74,11 +81,15 @@ void main() {
     float before = step(0.2, albedo.g) * (1.0 - inwards) * (1.0 - deep);
     vec3 bounce = mix(0.5 * (own + WALLS), NEIGHBOURS, 0.9 * max(teeth * (1.0 - 0.4 * inwards), 0.8 * before));
     vec3 arrives = reach / (reach + (1.0 - reach) * (1.0 - 0.9 * bounce));
-    arrives *= mix(vec3(1.0), mix(CREVICE, vec3(1.0), smoothstep(0.0, OPEN_SHARE, occlusion)), teeth * (1.0 - 0.7 * behind));
-    arrives *= mix(vec3(1.0), BEHIND, behind);
+    float creviced = teeth * (1.0 - max(0.35 * behind, 0.5 * inwards));
+    arrives *= mix(vec3(1.0), mix(CREVICE, vec3(1.0), smoothstep(0.0, OPEN_SHARE, occlusion)), creviced);
+    arrives *= mix(vec3(1.0), BEHIND * mix(NARROW, vec3(1.0), smoothstep(WIDE_MM2.x, WIDE_MM2.y, area)), behind);
     float sideways = (1.0 - deep) * abs(dot(away, side)) / length(opening_side);
     arrives *= mix(vec3(1.0), CORNER, teeth * smoothstep(CORNER_AT.x, CORNER_AT.y, sideways));
     float nh = dot(n, normalize(key_direction + v));
     float shine = wetness * (lobe(nh, 60.0) + 0.25 * lobe(nh, 12.0)) * reach * (1.0 - behind);  // else far teeth glitter
+    // What is wet mirrors the opening of the mouth, through which all light comes.
+    float mirrored = lobe(dot(own_normal, normalize(normalize(opening_centre - position) + v)), MIRROR);
+    shine += wetness * step(TONGUE_WET, wetness) * WET * mirrored * occlusion * (1.0 - smoothstep(-14.0, -4.0, past));
     v_colour = encode(own * tint * light * arrives + shine * key_colour);
 }

@@ -45,14 +45,15 @@ float freckle() {
 #endif
 
 #ifdef LIPS
-#define LIP_EDGE 0.32           // of v_lips to both sides of the edge
+#define LIP_EDGE 0.25           // of v_lips to both sides of the edge
+#define LIP_MIDDLE 0.55         // of v_lips: the edge, a little within its half way, which spreads where the corners are stretched
 
 uniform vec3 lip_tint;
 in float v_lips;
 
 // Vertices have the lips' colour in shares of v_lips, which their triangles would draw as a fringe.
 vec3 lips() {
-    float share = smoothstep(0.5 - LIP_EDGE, 0.5 + LIP_EDGE, v_lips);
+    float share = smoothstep(LIP_MIDDLE - LIP_EDGE, LIP_MIDDLE + LIP_EDGE, v_lips);
     return mix(vec3(1.0), lip_tint, share) / mix(vec3(1.0), lip_tint, v_lips);
 }
 #endif

@@ -24,6 +24,7 @@ def test_ict_is_taken_apart():
     names = [p.name for p in recipe.parts + recipe.teeth]
     assert names == ["face", "back", "cavity", "sockets", "gums_upper", "gums_lower", "tongue", "teeth_upper",
                      "teeth_lower"]  # fmt: skip
+    assert {p.name for p in recipe.parts if p.redrawn} == {"gums_upper", "gums_lower", "tongue"}
     assert recipe.parts[0].request.points <= 2500
     assert recipe.parts[0].holds(4704) and not recipe.parts[0].holds(9409)
     assert recipe_for(replace(sizes, faces=sizes.faces[1:])) is None
