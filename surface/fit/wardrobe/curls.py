@@ -14,6 +14,7 @@ from surface.fit.wardrobe.styles import BARE, Style, cap, denser, step
 _CURL = 1.0 / 30.0  # tiles of the noise for a mm: curls of a few mm
 _FLAT_MM = 6.0  # inside the line, over which curls lie on the skin and begin to cover it
 _ROUND_MM = 40.0  # further inside, over which a cloud of curls grows round
+_UNEVEN, _SHADED = 0.22, 0.10  # of the width over which curls run out, and of their brightness, by which they differ
 _STEADY = 0.2  # of the shader strand.frag, which stretches the noise along strands by its reciprocal
 
 
@@ -25,7 +26,7 @@ def crop(skin: Skin) -> Style:
         return np.asarray(0.6 + (3.2 + 2.4 * step(at[:, 1], 60.0, 125.0)) * step(line.inside(at), -3.0, 22.0))
 
     layers = (1.0, 0.52), (0.72, 0.80), (0.45, 1.4)
-    return Style(_shells(skin, line, thickness, layers, short_mm=1.5, fade=0.91), line)
+    return Style(_shells(skin, line, thickness, layers, short_mm=1.0, fade=0.84), line)
 
 
 def afro(skin: Skin) -> Style:
@@ -47,7 +48,7 @@ def _shells(
 ) -> list[Patches]:  # fmt: skip
     """Closed patches one over the other, the outermost first, each with a share of the thickness and its cover, which
     fades from a share of the way to the line on: what fades where it stands off the skin is seen through."""
-    out = []
+    out, random = [], np.random.default_rng(71)
     for k, (share, cover) in enumerate(layers):
         own = cap(skin, line, thickness, share=share, short_mm=short_mm, openness=1.0 - 0.22 * k, dense=dense)
         strands = own.strands.copy()
@@ -56,6 +57,10 @@ def _shells(
         around = 520.0 * np.sin(np.minimum(1.75 * v, 0.5 * np.pi))  # mm round the head there
         strands[..., 0] = np.rint(520.0 * _CURL) * u + 0.37 * k + 0.0 * around
         strands[..., 1] = 150.0 * v * _CURL / _STEADY + 0.21 * k
-        strands[..., 2] = cover - (cover + BARE) * step(way, fade, 1.0)
-        out.append(Patches(own.points, own.degrees, own.grid, own.fast, strands, own.tint, own.shade, own.sway))
+        wanders = _UNEVEN * random.standard_normal(u.shape[1:2])
+        wanders[-1] = wanders[0]
+        strands[..., 2] = cover - (cover + BARE) * step(way + (1.0 - fade) * wanders[None, :, None], fade, 1.0)
+        shade = own.shade * (1.0 + _SHADED * random.standard_normal(own.shade.shape).clip(-2.0, 2.0))
+        shade[:, -1] = shade[:, 0]
+        out.append(Patches(own.points, own.degrees, own.grid, own.fast, strands, own.tint, shade, own.sway))
     return out

@@ -24,7 +24,7 @@ BARE = (
 class Style:
     """A style: its patches, for :func:`surface.fit.wardrobe.patches.arrays`, and the line inside which it grows.
 
-    hanging : patches that are seen from both sides. fade : mm inside the line, from where the skin begins to have the
+    hanging : patches that are seen from both sides. strays : fins of stray hairs, the same. fade : mm inside the line, from where the skin begins to have the
     colour of hair to where it has it.
     """
 
@@ -32,6 +32,7 @@ class Style:
     hairline: Hairline
     hanging: tuple[Patches, ...] = ()
     fade: tuple[float, float] = (-6.0, 8.0)
+    strays: tuple[Patches, ...] = ()
 
 
 def step(x: Floats, low: float, high: float) -> Floats:

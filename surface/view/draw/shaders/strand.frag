@@ -31,11 +31,11 @@ void main() {
     float height = 0.5 + 1.25 * (noise.w - 0.5) + 0.75 * (noise.x - 0.5);
 #else
     vec4 noise = texture(detail, v_strand.xy * vec2(1.0, STEADY));
-    vec4 fine = texture(detail, v_strand.xy * vec2(2.6, 0.5));
+    vec4 fine = texture(detail, v_strand.xy * vec2(4.1, 0.5));
     float single = 1.0 - smoothstep(0.1, 0.9, v_strand.z);  // where strands end they are hairs, not teeth of a saw
     float height = 0.5 + (1.0 - 0.55 * single) * (noise.w - 0.5) + (0.6 - 0.3 * single) * (noise.x - 0.5)
-        + (0.5 + 0.5 * single) * (fine.w - 0.5);
-    noise = mix(noise, fine, 0.6);
+        + (0.5 + 0.6 * single) * (fine.x - 0.5);
+    noise = mix(noise, fine, 0.5);
 #endif
     float over = v_strand.z - height;
     float cover = step(0.0, over);
@@ -52,11 +52,11 @@ void main() {
     if (cover <= 0.0) {
         discard;
     }
-    vec3 lit = v_colour.rgb * (0.45 + 1.1 * noise.y + 0.9 * (noise.w - 0.5));
+    vec3 lit = v_colour.rgb * (0.55 + 0.9 * noise.y + 0.8 * (noise.w - 0.5));
 #ifndef PER_VERTEX
-    float sine = v_strand.w + 0.30 * (noise.z - 0.5);
+    float sine = v_strand.w + 0.42 * (noise.z - 0.5);
     lit += v_through * shine(sine, THROUGH) * (0.3 + 1.4 * noise.x);
-    lit += v_surface * (shine(sine, SURFACE) * (0.1 + 2.9 * noise.y * noise.y));
+    lit += v_surface * (shine(sine, SURFACE) * (0.25 + 2.2 * noise.y * noise.y));
 #endif
 #ifdef PER_VERTEX
     float roots = v_strand.w;
