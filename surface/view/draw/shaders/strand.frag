@@ -31,9 +31,9 @@ void main() {
     float height = 0.5 + 1.25 * (noise.w - 0.5) + 0.75 * (noise.x - 0.5);
 #else
     vec4 noise = texture(detail, v_strand.xy * vec2(1.0, STEADY));
-    vec4 fine = texture(detail, v_strand.xy * vec2(4.1, 0.5));
+    vec4 fine = texture(detail, v_strand.xy * vec2(2.9, 0.5));
     float single = 1.0 - smoothstep(0.1, 0.9, v_strand.z);  // where strands end they are hairs, not teeth of a saw
-    float height = 0.5 + (1.0 - 0.55 * single) * (noise.w - 0.5) + (0.6 - 0.3 * single) * (noise.x - 0.5)
+    float height = 0.5 + (1.0 - 0.72 * single) * (noise.w - 0.5) + (0.6 - 0.2 * single) * (noise.x - 0.5)
         + (0.5 + 0.6 * single) * (fine.x - 0.5);
     noise = mix(noise, fine, 0.5);
 #endif
