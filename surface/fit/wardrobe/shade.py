@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.interpolate import BSpline
+from scipy.ndimage import gaussian_filter
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats
-from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.patches import Patches, knots
 from surface.fit.wardrobe.skin import Skin, unit
 
 _RAYS = 40
@@ -17,24 +19,49 @@ _STEPS_MM = np.array([2.5, 4.5, 7.0, 10.0, 14.0, 19.0, 25.0, 33.0, 42.0])  # alo
 _THICK = 0.28, 1.4  # of the way along a ray, mm: hair that is so near to the ray stands in it
 _CLEAR_MM = 0.8  # over the skin, from where rays start
 _NEAR_MM, _MOST = 60.0, 0.72  # from hair, beyond which there is no shade; and the darkest that shade is
+_SOFT = 1.3, 0.5  # vertices along u and v, over which shade on cloth is soft: from one to the next it may be a stripe
 _HAIRY = 0.35  # cover from which hair keeps light out
 
 
 def shade(skin: Skin, patches: Sequence[Patches]) -> Floats:
     """(s,) share of the light that patches keep from the skin's samples, 0..1."""
     hair = np.concatenate([_solid(patch) for patch in patches])
-    tree, out = cKDTree(hair), np.zeros(len(skin.points))
-    near = np.flatnonzero(tree.query(skin.points, distance_upper_bound=_NEAR_MM)[0] < _NEAR_MM)
-    rays = unit(_evenly(_RAYS))
-    for ray in rays:
-        toward = unit(skin.normals[near] + 0.92 * ray + _ABOVE)
-        start = skin.points[near] + _CLEAR_MM * skin.normals[near]
-        blocked = np.zeros(len(near), bool)
+    return _MOST * blocked(skin.points, skin.normals, hair)
+
+
+def worn_shade(patch: Patches, things: Floats) -> Floats:
+    """(k, gu, gv) share of the light that things (n, 3), densely sampled, keep from a patch's vertices, 0..1."""
+    at = [np.linspace(0.0, 1.0, n) for n in patch.grid]
+    out = np.empty(patch.shade.shape)
+    for row, points in zip(out, patch.points, strict=True):
+        places = surface_at(points, patch.degrees, at)
+        normals = unit(np.cross(np.gradient(places, axis=0), np.gradient(places, axis=1)))
+        dark = blocked(places.reshape(-1, 3), normals.reshape(-1, 3), things).reshape(patch.grid)
+        row[:] = _MOST * gaussian_filter(dark, _SOFT, mode=("wrap", "nearest"))
+    return out
+
+
+def surface_at(points: Floats, degrees: tuple[int, int], at: Sequence[Floats]) -> Floats:
+    """Places of a patch's surface over control points (nu, nv, 3), at every pair of u and v."""
+    for axis, (degree, where) in enumerate(zip(degrees, at, strict=True)):
+        own = knots(points.shape[axis], degree)
+        points = BSpline(np.concatenate([own[:, 0], own[-1, 1:]]), points, degree, axis=axis)(where)
+    return points
+
+
+def blocked(points: Floats, normals: Floats, things: Floats) -> Floats:
+    """(n,) share of the light to places (n, 3) with normals (n, 3) in whose way things (m, 3) are."""
+    tree, out = cKDTree(things), np.zeros(len(points))
+    near = np.flatnonzero(tree.query(points, distance_upper_bound=_NEAR_MM)[0] < _NEAR_MM)
+    for ray in _evenly(_RAYS):
+        toward = unit(normals[near] + 0.92 * ray + _ABOVE)
+        start = points[near] + _CLEAR_MM * normals[near]
+        stopped = np.zeros(len(near), bool)
         for way in _STEPS_MM:
             away, _ = tree.query(start + way * toward, distance_upper_bound=_THICK[0] * way + _THICK[1])
-            blocked |= np.isfinite(away)
-        out[near] += blocked / _RAYS
-    return np.asarray(_MOST * out)
+            stopped |= np.isfinite(away)
+        out[near] += stopped / _RAYS
+    return out
 
 
 def _solid(patch: Patches) -> Floats:

@@ -11,11 +11,12 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import BSpline, CubicSpline, make_interp_spline
+from scipy.interpolate import CubicSpline, make_interp_spline
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import Flow, Thickness, grow, resampled
 from surface.fit.wardrobe.patches import Patches, greville, knots
+from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.skin import Skin, unit
 from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, denser, step
 
@@ -122,10 +123,7 @@ def sheets(
 
 def _thinned(made: Patches, inside: Depth, edge_mm: float, random: np.random.Generator) -> Patches:
     """A sheet whose cover falls to nothing over the last ``edge_mm`` before a line."""
-    at = made.points[0]
-    for axis in (0, 1):
-        every = np.concatenate([(own := knots(at.shape[axis], 3))[:, 0], own[-1, 1:]])
-        at = BSpline(every, at, 3, axis=axis)(np.linspace(0.0, 1.0, made.grid[axis]))
+    at = surface_at(made.points[0], made.degrees, [np.linspace(0.0, 1.0, n) for n in made.grid])
     left = inside(at.reshape(-1, 3)).reshape(made.grid)
     wanders = 0.16 * edge_mm * random.standard_normal((made.grid[0], 1))
     wanders[-1] = wanders[0]
