@@ -14,6 +14,7 @@ from surface.fit.wardrobe.styles import BARE, Style, cap, denser, step
 _CURL = 1.0 / 30.0  # tiles of the noise for a mm: curls of a few mm
 _FLAT_MM = 6.0  # inside the line, over which curls lie on the skin and begin to cover it
 _ROUND_MM = 40.0  # further inside, over which a cloud of curls grows round
+_FADE_MM = -3.0, 17.0  # black hair darkens skin at once: a line that is soft to the eye is wide
 _UNEVEN, _SHADED = 0.22, 0.10  # of the width over which curls run out, and of their brightness, by which they differ
 _STEADY = 0.2  # of the shader strand.frag, which stretches the noise along strands by its reciprocal
 
@@ -26,7 +27,7 @@ def crop(skin: Skin) -> Style:
         return np.asarray(0.6 + (3.2 + 2.4 * step(at[:, 1], 60.0, 125.0)) * step(line.inside(at), -3.0, 22.0))
 
     layers = (1.0, 0.52), (0.72, 0.80), (0.45, 1.4)
-    return Style(_shells(skin, line, thickness, layers, short_mm=1.0, fade=0.84), line)
+    return Style(_shells(skin, line, thickness, layers, short_mm=0.5, fade=0.80), line, fade=_FADE_MM)
 
 
 def afro(skin: Skin) -> Style:
@@ -39,7 +40,7 @@ def afro(skin: Skin) -> Style:
         return np.asarray(0.8 + full * within * (2.0 - within))  # rises at once, at half a right angle: no brim
 
     layers = (1.0, 0.42), (0.92, 0.72), (0.66, 1.4)
-    return Style(_shells(skin, line, thickness, layers, short_mm=0.5, fade=0.95, dense=0.45), line)
+    return Style(_shells(skin, line, thickness, layers, short_mm=0.5, fade=0.92, dense=0.45), line, fade=_FADE_MM)
 
 
 def _shells(

@@ -13,7 +13,7 @@ from surface.fit.wardrobe.patches import Patches, greville
 from surface.fit.wardrobe.skin import unit
 from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, step
 
-_POINTS, _GRID, _FAST = (2, 7), (3, 10), (2, 6)  # control points and vertices across and along a fin
+_POINTS, _GRID, _FAST = (2, 7), (3, 10), (2, 5)  # control points and vertices across and along a fin
 _SUNK_MM = 0.6  # below the sheet, where fins begin, so that no gap is seen under them
 _TILT = 0.45  # by how much fins lean to either side at most: upright ones would all be seen at once
 _COVER = 0.62, 0.06  # at the sheet, and at a fin's upper edge: few hairs stand off far
