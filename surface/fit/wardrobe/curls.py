@@ -58,7 +58,7 @@ def _shells(
         around = 520.0 * np.sin(np.minimum(1.75 * v, 0.5 * np.pi))  # mm round the head there
         strands[..., 0] = np.rint(520.0 * _CURL) * u + 0.37 * k + 0.0 * around
         strands[..., 1] = 150.0 * v * _CURL / _STEADY + 0.21 * k
-        wanders = _UNEVEN * random.standard_normal(u.shape[1:2])
+        wanders = _UNEVEN * np.abs(random.standard_normal(u.shape[1:2]))
         wanders[-1] = wanders[0]
         strands[..., 2] = cover - (cover + BARE) * step(way + (1.0 - fade) * wanders[None, :, None], fade, 1.0)
         shade = own.shade * (1.0 + _SHADED * random.standard_normal(own.shade.shape).clip(-2.0, 2.0))
