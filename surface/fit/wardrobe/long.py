@@ -22,6 +22,7 @@ TIPS_Y, SHORTER_MM = (
     24.0,
 )  # mm: where it ends at the sides, and by how much it is shorter behind, clear of the back
 OVER_EAR_MM = 11.0
+_MEET = 5.0  # guides from where both sides meet behind, over which waves begin: else there is a gap between them
 _LEVELLED = 2.5, 1.5, 0.0  # guides and places along them, over which those that hang are levelled
 _HANGS_Y = 55.0, 95.0  # mm: where they hang, and where they do not yet
 _WAVE_MM, _WAVE_DEEP_MM = 88.0, 3.4  # how long waves of hair that hangs are, and how far they go at most
@@ -94,9 +95,11 @@ def _waved(paths: Floats, side: float) -> Floats:
     free, ends = step(-y, -35.0, 40.0), step(-y, -TIPS_Y - _TURNS_IN_MM[0], -TIPS_Y)
     which = np.linspace(0.0, 1.0, len(paths))[:, None]
     way = 2.0 * np.pi * (y / _WAVE_MM + 0.9 * np.sin(5.0 * which))
-    wave = _WAVE_DEEP_MM * free * np.sin(way)
+    from_behind = np.arange(float(len(paths)))[:: 1 if side > 0.0 else -1, None]  # both sides stay where they meet
+    deep = _WAVE_DEEP_MM * free * step(from_behind, 0.0, _MEET)
+    wave = deep * np.sin(way)
     outwards = side * (wave - _TURNS_IN_MM[1] * ends)
-    return np.stack([x + outwards, y, z + 0.8 * _WAVE_DEEP_MM * free * np.cos(way)], axis=2)
+    return np.stack([x + outwards, y, z + 0.8 * deep * np.cos(way)], axis=2)
 
 
 def _inside(a: Floats, b: Floats, c: Floats) -> bool:

@@ -18,7 +18,7 @@ _ABOVE = np.array([0.0, 0.55, 0.35])  # from where most light comes: so much is 
 _STEPS_MM = np.array([2.5, 4.5, 7.0, 10.0, 14.0, 19.0, 25.0, 33.0, 42.0])  # along a ray
 _THICK = 0.24, 1.2  # of the way along a ray, mm: hair that is so near to the ray stands in it
 _CLEAR_MM = 0.8  # over the skin, from where rays start
-_NEAR_MM, _MOST = 60.0, 0.62  # from hair, beyond which there is no shade; and the darkest that shade is
+_NEAR_MM, _MOST = 60.0, 0.55  # from hair, beyond which there is no shade; and the darkest that shade is
 _SOFT = 1.3, 0.5  # vertices along u and v, over which shade on cloth is soft: from one to the next it may be a stripe
 _HAIRY = 0.35  # cover from which hair keeps light out
 
