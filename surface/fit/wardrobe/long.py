@@ -27,11 +27,11 @@ _LEVELLED = 2.5, 1.5, 0.0  # guides and places along them, over which those that
 _HANGS_Y = 55.0, 95.0  # mm: where they hang, and where they do not yet
 _WAVE_MM, _WAVE_DEEP_MM = 88.0, 3.4  # how long waves of hair that hangs are, and how far they go at most
 _TURNS_IN_MM = 30.0, 9.0  # of its end, that turns in, and by how much
-RAGGED_MM = 3.5  # by how much locks differ in length: more is a hem torn, not cut
+RAGGED_MM = 1.5  # by how much locks differ in length: more is a hem torn, not cut
 STRAYS = Strays(15, 5.0, (0.02, 0.97))  # of either side
 FRAYED = 0.05, 0.0  # of the width, at the face and behind
 LAYERS = (
-    Layer(1.07, 0.46, 1.0, 56.0, 0.1), Layer(1.0, 0.70, 0.90, 42.0, 0.1), Layer(0.86, 1.6, 0.66, 26.0),
+    Layer(1.07, 0.46, 1.0, 56.0, 0.1), Layer(1.0, 0.70, 0.90, 42.0, 0.1), Layer(0.84, 1.6, 0.72, 26.0),
 )  # fmt: skip
 
 
