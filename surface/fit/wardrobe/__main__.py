@@ -34,7 +34,8 @@ def main(head: str, out: str, *names: str) -> None:
                 parts["tresses"] = "tress", list(style.hanging)
             if style.strays:
                 parts["strays"] = "tress", list(style.strays)
-            write_garment(path, skin, parts, hair_fields(skin, style.hairline, style.fade, [*style.patches, *style.hanging]))
+            pictures = hair_fields(skin, style.hairline, style.fade, [*style.patches, *style.hanging])
+            write_garment(path, skin, parts, pictures)
     for name, neck in NECKS.items():
         if not names or name in names:
             parts = {"clothes": ("cloth", garment(skin, neck))}

@@ -10,7 +10,7 @@ from surface.fit.wardrobe.hairline import Hairline
 from surface.fit.wardrobe.patches import Patches
 from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import BARE, Style, cap, denser, step
+from surface.fit.wardrobe.styles import BARE, Style, cap, step
 
 _CURL = 1.0 / 30.0  # tiles of the noise for a mm: curls of a few mm
 _FLAT_MM = 6.0  # inside the line, over which curls lie on the skin and begin to cover it

@@ -27,7 +27,7 @@ _ROOTED = 0.30, 0.45  # by how much less light reaches roots, and the share of t
 _CLOSER = 0.45  # how much less light reaches cropped hairs, which lie on the skin
 _CROPPED = 20.0  # how many times shorter the pieces are that one sees of cropped hairs
 _UNEVEN = 0.35  # by how much the length that is roots differs along a hairline: an even one looks cut as with a saw
-_AT_EAR, _EAR_MM = 0.65, 30.0  # by how much narrower a soft edge is over the ears, where no forehead is, and how far off
+_AT_EAR, _EAR_MM = 0.65, 30.0  # by how much narrower a soft edge is over the ears, and how far off them
 _EDGE_BARE = 0.2  # how far below nothing cover is at a frayed edge: single strands there look like threads of a web
 _BACKED = 0.6  # how much less of the innermost sheet frays: skin between the strands of an edge is a dotted line
 Drape = Callable[[Floats], Floats]
@@ -43,8 +43,8 @@ class Layer:
     share : of the hair's thickness at which it lies. cover : how much of it strands fill, from 0 to 1 and more; below
     0.5 gaps are wider than strands. openness : how much light reaches it. fray_mm : of the length, along which strands
     end one after the other. roots : how much less of the sheet its roots are, which are so along ``roots_mm``.
-    cropped_mm : of the length, along which what is seen are ends of hairs, each a few mm long. edge_mm : from where hair
-    is cut, over which it grows denser, whichever way strands lie there.
+    cropped_mm : of the length, along which what is seen are ends of hairs, each a few mm long. edge_mm : from where
+    hair is cut, over which it grows denser, whichever way strands lie there.
     """
 
     share: float

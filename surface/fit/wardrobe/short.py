@@ -29,7 +29,8 @@ FRINGED = (
     Layer(0.88, 1.8, 0.70, 17.0, edge_mm=11.0),
 )  # fmt: skip
 SWEPT = (
-    Layer(1.10, 0.46, 1.0, 24.0, cropped_mm=7.0, edge_mm=7.0), Layer(1.0, 0.72, 0.90, 18.0, cropped_mm=7.0, edge_mm=10.0),
+    Layer(1.10, 0.46, 1.0, 24.0, cropped_mm=7.0, edge_mm=7.0),
+    Layer(1.0, 0.72, 0.90, 18.0, cropped_mm=7.0, edge_mm=10.0),
     Layer(0.88, 1.8, 0.76, 14.0, cropped_mm=7.0, edge_mm=14.0),
 )  # fmt: skip
 
@@ -118,8 +119,8 @@ def _swept_back(skin: Skin, sweep: Sweep, seed: int) -> Style:
 
     def comb(round_it: Floats) -> Comb:
         return Comb(
-            _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, RAGGED_MM, 1.9, 1.0, steps=66, slack=slack,
-            pole=True,
+            _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, RAGGED_MM, 1.9, 1.0, steps=66,
+            slack=slack, pole=True,
         )  # fmt: skip
 
     made = sheets(skin, _spread(skin, comb), sweep.layers, WEAVE, seed=seed, closed=True)
