@@ -29,7 +29,7 @@ def test_less_light_gets_below_a_plate_the_nearer_it_is() -> None:
     dark = [float(blocked(np.zeros((1, 3)), UP, plate(height, 18.0))[0]) for height in (6.0, 46.0, 55.0)]
     assert dark[0] > 0.95 > dark[1] > dark[2] == 0.0
     assert blocked(np.zeros((1, 3)), UP, plate(-6.0))[0] == 0.0  # what lies below takes nothing
-    beside = blocked(np.array([[30.0, 0.0, 0.0]]), UP, plate(6.0, 18.0))[0]
+    beside = blocked(np.array([[21.0, 0.0, 0.0]]), UP, plate(6.0, 18.0))[0]
     assert 0.0 < beside < 0.5 * dark[0]
     assert blocked(np.array([[300.0, 0.0, 0.0]]), UP, plate(6.0))[0] == 0.0
 
