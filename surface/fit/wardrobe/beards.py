@@ -34,7 +34,7 @@ _FAN = 0.3  # by how much narrower the moustache's roots lie than its tips: hair
 _BEHIND = 0.8  # mm inside the beard's end at the ear for a degree: there it thins out slowly
 _UNEVEN_MM, _UNEVEN_DEG = 1.6, 3.1  # by how much the line at which hairs begin wanders, and how fast
 _SIDE_DEG, _SIDE = (45.0, 86.0), 0.85  # between which it gets shorter towards the ear, and by which share
-_HAIRS = 1.0 / 26.0  # tiles of the noise for a mm across hairs
+_HAIRS = 1.0 / 19.0  # tiles of the noise for a mm across hairs
 _ROOTS_MM, _SHORTER = 7.0, 10.0  # from a shell's upper line, where hairs are seen in so many times shorter pieces
 
 
@@ -52,7 +52,7 @@ class Beard:
 
 BEARDS = {
     "beard-full": Beard(4.4, 7.0, ((1.0, 0.46), (0.72, 0.62), (0.40, 0.85)), 0.85, 210.0),
-    "beard-short": Beard(1.7, 0.6, ((1.0, 0.40), (0.5, 0.50)), 0.62, 64.0),
+    "beard-short": Beard(1.7, 0.6, ((1.0, 0.48), (0.5, 0.60)), 0.62, 64.0),
 }
 
 
@@ -81,7 +81,7 @@ def garment(skin: Skin, beard: Beard) -> list[Patches]:
     lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _ANGLES[:5], _LIP), 5, _FAN)
     out = []
     for k, (share, cover) in enumerate(beard.shells):
-        out.append(_shell(skin, beard, main, (43, 13), (23, 7), share, cover, k, _WIDE_MM, over_lip=False))
+        out.append(_shell(skin, beard, main, (43, 13), (29, 10), share, cover, k, _WIDE_MM, over_lip=False))
         out.append(_shell(skin, beard, lip, (19, 6), (10, 4), share, _DENSER * cover, k, _LIP_MM, over_lip=True))
     return out
 
