@@ -32,7 +32,10 @@ def main(head: str, out: str, *names: str) -> None:
             parts = {"hair": ("strand", style.patches)}
             if style.hanging:
                 parts["tresses"] = "tress", list(style.hanging)
-            write_garment(path, skin, parts, hair_fields(skin, style.hairline, style.fade))
+            if style.strays:
+                parts["strays"] = "tress", list(style.strays)
+            pictures = hair_fields(skin, style.hairline, style.fade, [*style.patches, *style.hanging])
+            write_garment(path, skin, parts, pictures)
     for name, neck in NECKS.items():
         if not names or name in names:
             parts = {"clothes": ("cloth", garment(skin, neck))}

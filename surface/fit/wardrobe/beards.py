@@ -15,24 +15,26 @@ from surface.fit.wardrobe.styles import BARE, step
 #: By the angle from the front, degrees, about the vertical through (0, 20): the beard's upper and lower line, mm, and
 #: the upper line of its part below the mouth.
 _ANGLES = np.array([0.0, 8.0, 15.0, 20.0, 24.0, 32.0, 45.0, 60.0, 75.0, 87.0, 95.0])
-_UPPER = np.array([-13.0, -12.0, -13.0, -15.5, -18.5, -22.0, -26.0, -23.0, -8.0, 12.0, 14.0])
+_UPPER = np.array([-14.0, -12.5, -13.6, -18.0, -22.5, -24.5, -26.0, -23.0, -8.0, 12.0, 14.0])
 _LOWER = np.array([-94.0, -94.0, -93.0, -92.0, -90.0, -88.0, -84.0, -76.0, -60.0, -32.0, -4.0])
 _BELOW = np.array([-42.0, -42.0, -41.0, -34.0, -25.0, -23.0, -26.0, -23.0, -8.0, 12.0, 14.0])
-_LIP = np.array([-23.5, -24.0, -26.0, -29.3, -33.2])  # lower line of the moustache, at the first five angles: it ends
+_LIP = np.array([-25.4, -25.4, -26.0, -28.0, -29.6])  # lower line of the moustache, at the first five angles: it ends
 # level with the corners of the mouth, since one that hangs over them makes every face look sad
 _EDGE_DEG = 90.0
 _LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.2])
 _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips is theirs
 _LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
-_FIELD_MM = -7.0, 11.0  # inside the beard's lines: where stubble begins, and where it is dense
+_FIELD_MM = -8.0, 12.0  # inside the beard's lines: where stubble begins, and where it is dense
 _DENSER = 1.3  # hair over the lip, which is too short to lie over what is beside it
-_WIDE_MM = 6.0  # inside its lines, where a beard is dense
-_LIP_MM = 1.6  # the same over the lip
+_WIDE_MM = 11.0  # inside its lines, where a beard is dense
+_LIP_DEG = 26.0  # from the middle, where it ends: just past the corners of the mouth
+_LIP_MM = 2.6  # the same over the lip
+_SHADED = 0.14  # by how much locks differ in brightness
 _FAN = 0.3  # by how much narrower the moustache's roots lie than its tips: hairs lie outwards from the middle
 _BEHIND = 0.8  # mm inside the beard's end at the ear for a degree: there it thins out slowly
 _UNEVEN_MM, _UNEVEN_DEG = 1.6, 3.1  # by how much the line at which hairs begin wanders, and how fast
 _SIDE_DEG, _SIDE = (45.0, 86.0), 0.85  # between which it gets shorter towards the ear, and by which share
-_HAIRS = 1.0 / 26.0  # tiles of the noise for a mm across hairs
+_HAIRS = 1.0 / 19.0  # tiles of the noise for a mm across hairs
 _ROOTS_MM, _SHORTER = 7.0, 10.0  # from a shell's upper line, where hairs are seen in so many times shorter pieces
 
 
@@ -50,7 +52,7 @@ class Beard:
 
 BEARDS = {
     "beard-full": Beard(4.4, 7.0, ((1.0, 0.46), (0.72, 0.62), (0.40, 0.85)), 0.85, 210.0),
-    "beard-short": Beard(1.7, 0.6, ((1.0, 0.40), (0.5, 0.50)), 0.62, 64.0),
+    "beard-short": Beard(1.7, 0.6, ((1.0, 0.48), (0.5, 0.60)), 0.62, 64.0),
 }
 
 
@@ -74,12 +76,12 @@ def garment(skin: Skin, beard: Beard) -> list[Patches]:
     """Shells, the outermost first: those of cheeks, jaw and chin, and those of the upper lip."""
     wide = _EDGE_DEG * (1.0 - 2.0 * greville(31, 2))  # so that the outside is outside
     main = _grid(skin, wide, np.interp(np.abs(wide), _ANGLES, _BELOW), np.interp(np.abs(wide), _ANGLES, _LOWER), 11)
-    narrow = 27.0 * (1.0 - 2.0 * greville(13, 2))
+    narrow = _LIP_DEG * (1.0 - 2.0 * greville(13, 2))
     top = np.interp((1.0 - _FAN) * np.abs(narrow), _ANGLES, _UPPER)
     lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _ANGLES[:5], _LIP), 5, _FAN)
     out = []
     for k, (share, cover) in enumerate(beard.shells):
-        out.append(_shell(skin, beard, main, (43, 13), (23, 7), share, cover, k, _WIDE_MM, over_lip=False))
+        out.append(_shell(skin, beard, main, (43, 13), (29, 10), share, cover, k, _WIDE_MM, over_lip=False))
         out.append(_shell(skin, beard, lip, (19, 6), (10, 4), share, _DENSER * cover, k, _LIP_MM, over_lip=True))
     return out
 
@@ -139,7 +141,7 @@ def _shell(
     openness = 0.72 + 0.28 * share + 0.0 * s
     if over_lip:
         openness = 0.9 * openness
-        reached = reached * step(np.minimum(s, 1.0 - s), 0.0, 0.05) * (1.0 - 0.8 * step(t, 0.65, 1.0))
+        reached = reached * step(np.minimum(s, 1.0 - s), 0.0, 0.2) * (1.0 - 0.9 * step(t, 0.6, 1.0))
     else:
         reached = reached * step(t, 0.0, 0.1)
     along = (t * length - _ROOTS_MM * _SHORTER * np.exp(-t * length / _ROOTS_MM)) / beard.grain
@@ -147,8 +149,10 @@ def _shell(
         [s * width * _HAIRS + 0.31 * layer, along, cover * reached - BARE * (1.0 - reached), openness], axis=-1
     )
     tint = np.full((1, gu, gv), share) * reached
+    locks = np.random.default_rng(91 + layer).standard_normal((gu, 1)).clip(-2.0, 2.0)
+    shade = np.broadcast_to(1.0 + _SHADED * locks, (1, gu, gv))
     return Patches(
-        points[None], (2, 2), grid, fast, strands[None], tint, np.ones((1, gu, gv)), np.zeros((1, nu, nv)), 1.0,
+        points[None], (2, 2), grid, fast, strands[None], tint, shade, np.zeros((1, nu, nv)), 1.0,
         whole=False,
     )  # fmt: skip
 

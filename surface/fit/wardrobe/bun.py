@@ -9,6 +9,7 @@ from surface.fit.wardrobe.hairline import TIED, Hairline, directions
 from surface.fit.wardrobe.patches import Patches
 from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheet, sheets
 from surface.fit.wardrobe.skin import CENTRE, Skin, unit
+from surface.fit.wardrobe.strays import Strays, strays
 from surface.fit.wardrobe.styles import Style, step, tangent
 
 BUN = np.array([0.0, 98.0, -97.0])  # its middle, mm
@@ -16,13 +17,15 @@ _OUT = unit(np.array([0.0, 0.42, -0.91]))  # where it points
 _RADII = np.array([29.0, 26.0, 22.0])  # half its width, its height, and along where it points
 GUIDES = 73
 LAYERS = (
-    Layer(1.06, 0.50, 1.0, 4.0, 0.8, 26.0), Layer(1.0, 0.78, 0.92, 4.0, 1.1, 20.0),
-    Layer(0.90, 1.8, 0.80, 4.0, 2.1, 13.0),
+    Layer(1.06, 0.50, 1.0, 4.0, 0.8, 26.0, edge_mm=8.0), Layer(1.0, 0.78, 0.92, 4.0, 1.1, 20.0, edge_mm=9.0),
+    Layer(0.90, 1.8, 0.80, 4.0, 2.1, 13.0, edge_mm=9.0),
 )  # fmt: skip
 # The inner one so dense that it is closed up to its tip: nothing lies below it
-BUN_LAYERS = (Layer(1.04, 0.5, 1.0, 6.0), Layer(1.0, 6.6, 0.82, 0.2))
+BUN_LAYERS = (Layer(1.04, 0.5, 1.0, 6.0), Layer(1.0, 7.6, 0.82, 0.2))
 UNDER_MM = 8.0  # from the middle of the bun's base: there strands of the skull end, well below the coil
 FADE_MM = -7.0, 3.0  # short hairs that the tie does not reach: without them the line is cut as with a saw
+EDGE_MM = 2.5  # outside the line, where the first hairs grow
+STRAYS, COIL_STRAYS = Strays(44, 4.5, (0.0, 0.85)), Strays(12, 5.0, (0.0, 0.9))
 _UNEVEN = 0.01  # rad from the crown, by which hair begins sooner or later: along an even line it would be a cap
 _TURNS = 0.62  # of a strand about the bun, from its base to its tip
 
@@ -48,9 +51,17 @@ def bun(skin: Skin) -> Style:
     def cut(at: Floats) -> Floats:
         return np.asarray(np.linalg.norm(at - base, axis=1) - UNDER_MM)
 
-    comb = Comb(roots[::-1], np.full(GUIDES, 330.0), thickness, flow, cut, 0.0, 0.5, 0.0, steps=66, slack=0.4)
+    def edge(at: Floats) -> Floats:
+        return np.asarray(line.inside(at) + EDGE_MM)
+
+    comb = Comb(roots[::-1], np.full(GUIDES, 330.0), thickness, flow, cut, 0.0, 0.9, 0.0, steps=66, slack=0.4,
+                edge=edge)  # fmt: skip
     made = sheets(skin, comb, LAYERS, Weave((73, 12), (97, 15), (49, 9), -0.35), seed=31, closed=True)
-    return Style([*_coil(), *made], line, fade=FADE_MM)
+    coil = _coil()
+    stray = [strays(sheet, how, middle, seed=38) for sheet, how, middle in (
+        (made[0], STRAYS, CENTRE), (coil[0], COIL_STRAYS, BUN),
+    )]  # fmt: skip
+    return Style([*coil, *made], line, fade=FADE_MM, strays=tuple(stray))
 
 
 def _frame() -> Floats:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.shade import surface_at, worn_shade
 from surface.fit.wardrobe.skin import Skin, unit
 from surface.fit.wardrobe.styles import step
 
@@ -48,8 +49,9 @@ _ROLLED = np.array(
 #: far it hangs from its rim, mm, most at its two points and hardly where its edges meet, and how far it stands out,
 #: least where they meet, or it would jut out there as a board.
 _FOLDED, _DENSE = 64, 0.35
-_FALL = (0.0, 0.40, 0.52, 1.0, np.pi), (3.0, 54.0, 50.0, 31.0, 24.0)
-_OUT = (0.0, 0.15, 0.40, 1.0, np.pi), (1.0, 2.2, 7.0, 9.5, 9.0)
+_LINED = 0.8  # of a collar's height, over which its inside is made: below it one sees the back of its outside
+_FALL = (0.0, 0.40, 0.52, 1.0, np.pi), (3.0, 54.0, 50.0, 30.0, 20.0)
+_OUT = (0.0, 0.15, 0.40, 1.0, np.pi), (1.0, 2.2, 7.0, 11.0, 15.0)
 
 
 @dataclass(frozen=True)
@@ -84,15 +86,26 @@ def garment(skin: Skin, neck: Neck) -> list[Patches]:
     ring = _ring(skin, neck, angle)
     collar, trunk = _collar(skin, ring, neck), _trunk(skin, ring, angle)
     points = _closed(np.stack([*collar, *trunk], axis=1))
+    seen = skin.points[hidden_below(skin, neck) < 0.5]
     if neck.roll > 0.0:
         openness = np.concatenate([_ROLLED[:, 4], np.linspace(0.75, 1.0, 3), np.ones(len(trunk) - 3)])
-        return [_patch(points, (73, 33), (41, 17), openness)]
-    out = [_patch(points, (73, 25), (41, 13), _dark_within(len(collar), points.shape[1]))]
+        return [_shaded(_patch(points, (73, 33), (41, 17), openness), seen)]
+    out = [_patch(points, (73, 25), (41, 13), _dark_within((1.5 if neck.fold else 1.0) * len(collar), points.shape[1]))]
     if neck.fold:
         around = _dense_in_front(_FOLDED)
         folded = _closed(np.stack(_folded(skin, _ring(skin, neck, around), around), axis=1))
-        out.insert(0, _patch(folded, (97, 9), (65, 5), _dark_within(1, folded.shape[1])))
-    return out
+        over = _patch(folded, (97, 9), (65, 5), _dark_within(1, folded.shape[1]))
+        at = [np.linspace(0.0, 1.0, n) for n in (240, 20)]
+        lies = surface_at(folded, (3, 3), at)[:, 6:].reshape(-1, 3)
+        return [_shaded(over, seen), _shaded(out[0], np.concatenate([seen, lies]))]
+    return [_shaded(patch, seen) for patch in out]
+
+
+def _shaded(patch: Patches, things: Floats) -> Patches:
+    """A patch in the shade of things (n, 3): of chin and neck, and below a collar."""
+    strands = patch.strands.copy()
+    strands[..., 3] *= 1.0 - worn_shade(patch, things)
+    return replace(patch, strands=strands)
 
 
 def _closed(points: Floats) -> Floats:
@@ -103,7 +116,7 @@ def _closed(points: Floats) -> Floats:
     return out
 
 
-def _dark_within(inner: int, rows: int) -> Floats:
+def _dark_within(inner: float, rows: int) -> Floats:
     """(k,) how open cloth lies from row to row, of which the first ``inner`` lie inside the collar."""
     return 0.45 + 0.55 * step(np.linspace(0.0, 1.0, 8 * rows), 0.0, 1.5 * inner / rows)
 
@@ -152,7 +165,8 @@ def _collar(skin: Skin, ring: Floats, neck: Neck) -> list[Floats]:
     if neck.roll > 0.0:
         return [line + h * (rim - line) + (away + out * neck.roll) * level + over * neck.roll * up
                 for h, away, out, over, _ in _ROLLED]  # fmt: skip
-    inside, lip = rim - 1.6 * level - 9.0 * unit(rim - line), rim - 0.8 * level  # along the collar, which leans
+    deep = max(9.0, _LINED * neck.stand)
+    inside, lip = rim - 1.6 * level - deep * unit(rim - line), rim - 0.8 * level  # along the collar, which leans
     return [inside, lip, rim + 1.0 * up, rim + 1.2 * level - 1.0 * up, 0.5 * (rim + line) + 0.8 * level]
 
 

@@ -8,12 +8,15 @@ from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import Thickness
 from surface.fit.wardrobe.hairline import Hairline
 from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import BARE, Style, cap, denser, step
+from surface.fit.wardrobe.styles import BARE, Style, cap, step
 
 _CURL = 1.0 / 30.0  # tiles of the noise for a mm: curls of a few mm
 _FLAT_MM = 6.0  # inside the line, over which curls lie on the skin and begin to cover it
 _ROUND_MM = 40.0  # further inside, over which a cloud of curls grows round
+_FADE_MM = -3.0, 17.0  # black hair darkens skin at once: a line that is soft to the eye is wide
+_UNEVEN, _SHADED = 0.12, 0.10  # of the width over which curls run out, and of their brightness, by which they differ
 _STEADY = 0.2  # of the shader strand.frag, which stretches the noise along strands by its reciprocal
 
 
@@ -25,7 +28,7 @@ def crop(skin: Skin) -> Style:
         return np.asarray(0.6 + (3.2 + 2.4 * step(at[:, 1], 60.0, 125.0)) * step(line.inside(at), -3.0, 22.0))
 
     layers = (1.0, 0.52), (0.72, 0.80), (0.45, 1.4)
-    return Style(_shells(skin, line, thickness, layers, short_mm=1.5, fade=0.91), line)
+    return Style(_shells(skin, line, thickness, layers, short_mm=0.5, edge_mm=15.0), line, fade=_FADE_MM)
 
 
 def afro(skin: Skin) -> Style:
@@ -38,24 +41,31 @@ def afro(skin: Skin) -> Style:
         return np.asarray(0.8 + full * within * (2.0 - within))  # rises at once, at half a right angle: no brim
 
     layers = (1.0, 0.42), (0.92, 0.72), (0.66, 1.4)
-    return Style(_shells(skin, line, thickness, layers, short_mm=0.5, fade=0.95, dense=0.45), line)
+    return Style(_shells(skin, line, thickness, layers, short_mm=0.5, edge_mm=8.0, dense=0.45), line, fade=_FADE_MM)
 
 
 def _shells(
     skin: Skin, line: Hairline, thickness: Thickness, layers: tuple[tuple[float, float], ...], *, short_mm: float,
-    fade: float, dense: float = 0.0,
+    edge_mm: float, dense: float = 0.0,
 ) -> list[Patches]:  # fmt: skip
     """Closed patches one over the other, the outermost first, each with a share of the thickness and its cover, which
-    fades from a share of the way to the line on: what fades where it stands off the skin is seen through."""
-    out = []
+    fades over the last ``edge_mm`` before the line: what fades where it stands off the skin is seen through."""
+    out, random = [], np.random.default_rng(71)
     for k, (share, cover) in enumerate(layers):
         own = cap(skin, line, thickness, share=share, short_mm=short_mm, openness=1.0 - 0.22 * k, dense=dense)
         strands = own.strands.copy()
         u, v = strands[..., 0] / strands[..., 0].max(), np.linspace(0.0, 1.0, strands.shape[2])[None, None]
-        way = denser(v, dense)
         around = 520.0 * np.sin(np.minimum(1.75 * v, 0.5 * np.pi))  # mm round the head there
         strands[..., 0] = np.rint(520.0 * _CURL) * u + 0.37 * k + 0.0 * around
         strands[..., 1] = 150.0 * v * _CURL / _STEADY + 0.21 * k
-        strands[..., 2] = cover - (cover + BARE) * step(way, fade, 1.0)
-        out.append(Patches(own.points, own.degrees, own.grid, own.fast, strands, own.tint, own.shade, own.sway))
+        places = surface_at(own.points[0], own.degrees, [np.linspace(0.0, 1.0, n) for n in own.grid])
+        wanders = _UNEVEN * np.abs(random.standard_normal((len(places), 1)))
+        wanders[-1] = wanders[0]
+        inside = line.inside(places.reshape(-1, 3)).reshape(own.grid) / edge_mm
+        gone = 1.0 - step(inside - wanders * (inside < 1.5), 0.0, 1.0)
+        gone[:, -1] = 1.0
+        strands[..., 2] = cover - (cover + BARE) * gone
+        shade = own.shade * (1.0 + _SHADED * random.standard_normal(own.shade.shape).clip(-2.0, 2.0))
+        shade[:, -1] = shade[:, 0]
+        out.append(Patches(own.points, own.degrees, own.grid, own.fast, strands, own.tint, shade, own.sway))
     return out

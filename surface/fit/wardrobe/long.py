@@ -10,6 +10,7 @@ from surface.fit.wardrobe.hairline import Hairline
 from surface.fit.wardrobe.patches import Patches
 from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheets
 from surface.fit.wardrobe.skin import CENTRE, Skin, unit
+from surface.fit.wardrobe.strays import Strays, strays
 from surface.fit.wardrobe.styles import Style, cap, step, tangent
 
 PART_X = 14.0  # of the parting, mm
@@ -21,14 +22,16 @@ TIPS_Y, SHORTER_MM = (
     24.0,
 )  # mm: where it ends at the sides, and by how much it is shorter behind, clear of the back
 OVER_EAR_MM = 11.0
+_MEET = 5.0  # guides from where both sides meet behind, over which waves begin: else there is a gap between them
 _LEVELLED = 2.5, 1.5, 0.0  # guides and places along them, over which those that hang are levelled
 _HANGS_Y = 55.0, 95.0  # mm: where they hang, and where they do not yet
 _WAVE_MM, _WAVE_DEEP_MM = 88.0, 3.4  # how long waves of hair that hangs are, and how far they go at most
 _TURNS_IN_MM = 30.0, 9.0  # of its end, that turns in, and by how much
-RAGGED_MM = 2.5  # by how much locks differ in length: more is a hem torn, not cut
-FRAYED = 0.09, 0.0  # of the width, at the face and behind
+RAGGED_MM = 1.5  # by how much locks differ in length: more is a hem torn, not cut
+STRAYS = Strays(15, 5.0, (0.02, 0.97))  # of either side
+FRAYED = 0.05, 0.0  # of the width, at the face and behind
 LAYERS = (
-    Layer(1.07, 0.46, 1.0, 34.0, 0.1), Layer(1.0, 0.66, 0.92, 22.0, 0.1), Layer(0.88, 1.6, 0.74, 10.0),
+    Layer(1.07, 0.46, 1.0, 56.0, 0.1), Layer(1.0, 0.70, 0.90, 42.0, 0.1), Layer(0.84, 1.6, 0.72, 26.0),
 )  # fmt: skip
 
 
@@ -39,8 +42,10 @@ def long(skin: Skin) -> Style:
     def thickness(at: Floats) -> Floats:
         return np.asarray(1.4 + _full(line, at))
 
-    hanging = [patch for side in (1.0, -1.0) for patch in _curtain(skin, line, side)]
-    return Style([cap(skin, line, thickness, share=0.5, openness=0.7)], line, tuple(_inner_last(hanging)))
+    sides = [_curtain(skin, line, side) for side in (1.0, -1.0)]
+    hanging = _inner_last([patch for patches in sides for patch in patches])
+    stray = tuple(strays(patches[0], STRAYS, CENTRE, seed=28 + k) for k, patches in enumerate(sides))
+    return Style([cap(skin, line, thickness, share=0.5, openness=0.7)], line, tuple(hanging), strays=stray)
 
 
 def _full(line: Hairline, at: Floats) -> Floats:
@@ -90,9 +95,11 @@ def _waved(paths: Floats, side: float) -> Floats:
     free, ends = step(-y, -35.0, 40.0), step(-y, -TIPS_Y - _TURNS_IN_MM[0], -TIPS_Y)
     which = np.linspace(0.0, 1.0, len(paths))[:, None]
     way = 2.0 * np.pi * (y / _WAVE_MM + 0.9 * np.sin(5.0 * which))
-    wave = _WAVE_DEEP_MM * free * np.sin(way)
+    from_behind = np.arange(float(len(paths)))[:: 1 if side > 0.0 else -1, None]  # both sides stay where they meet
+    deep = _WAVE_DEEP_MM * free * step(from_behind, 0.0, _MEET)
+    wave = deep * np.sin(way)
     outwards = side * (wave - _TURNS_IN_MM[1] * ends)
-    return np.stack([x + outwards, y, z + 0.8 * _WAVE_DEEP_MM * free * np.cos(way)], axis=2)
+    return np.stack([x + outwards, y, z + 0.8 * deep * np.cos(way)], axis=2)
 
 
 def _inside(a: Floats, b: Floats, c: Floats) -> bool:
@@ -131,7 +138,7 @@ def _curtain(skin: Skin, line: Hairline, side: float) -> list[Patches]:
     fan, back = fan[order], back[order]
     length = np.full(len(roots), 430.0)
     comb = Comb(
-        roots[order], length, thickness, flow, cut, RAGGED_MM, 1.0, steps=72, stiff=0.6, slack=slack, ears=True,
+        roots[order], length, thickness, flow, cut, RAGGED_MM, 2.0, steps=72, stiff=0.6, slack=slack, ears=True,
         drape=lambda paths: _waved(_hung(paths, side), side),
     )  # fmt: skip
     return sheets(

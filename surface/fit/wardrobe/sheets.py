@@ -8,7 +8,7 @@ the hair.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
@@ -16,12 +16,18 @@ from scipy.interpolate import CubicSpline, make_interp_spline
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import Flow, Thickness, grow, resampled
 from surface.fit.wardrobe.patches import Patches, greville, knots
+from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.skin import Skin, unit
 from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, denser, step
 
+_CLUMPS_MM = 13.0  # how wide clumps of locks are, which are brighter or darker and end sooner or later than others
+_CLUMPED = 0.4  # by how much the length differs, over which strands of clumps end one after the other
+_SHADED = 0.11, 0.07  # by how much the brightness of clumps and of locks differs
+_ROOTED = 0.30, 0.45  # by how much less light reaches roots, and the share of the length until it reaches all
 _CLOSER = 0.45  # how much less light reaches cropped hairs, which lie on the skin
 _CROPPED = 20.0  # how many times shorter the pieces are that one sees of cropped hairs
 _UNEVEN = 0.35  # by how much the length that is roots differs along a hairline: an even one looks cut as with a saw
+_AT_EAR, _EAR_MM = 0.65, 30.0  # by how much narrower a soft edge is over the ears, and how far off them
 _EDGE_BARE = 0.2  # how far below nothing cover is at a frayed edge: single strands there look like threads of a web
 _BACKED = 0.6  # how much less of the innermost sheet frays: skin between the strands of an edge is a dotted line
 Drape = Callable[[Floats], Floats]
@@ -37,7 +43,8 @@ class Layer:
     share : of the hair's thickness at which it lies. cover : how much of it strands fill, from 0 to 1 and more; below
     0.5 gaps are wider than strands. openness : how much light reaches it. fray_mm : of the length, along which strands
     end one after the other. roots : how much less of the sheet its roots are, which are so along ``roots_mm``.
-    cropped_mm : of the length, along which what is seen are ends of hairs, each a few mm long.
+    cropped_mm : of the length, along which what is seen are ends of hairs, each a few mm long. edge_mm : from where
+    hair is cut, over which it grows denser, whichever way strands lie there.
     """
 
     share: float
@@ -47,6 +54,7 @@ class Layer:
     roots: float = 0.0
     roots_mm: float = 20.0
     cropped_mm: float = 0.0
+    edge_mm: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -55,7 +63,8 @@ class Comb:
 
     cut : where guides end. ragged_mm : by how much their lengths differ, of all or of each (g,). wave_mm : how far
     sheets bulge between locks. level : share of that which is gone at the tips. pole : do all
-    guides begin at the middle of their roots? drape : what becomes of guides that hang.
+    guides begin at the middle of their roots? drape : what becomes of guides that hang. edge : mm inside the line at
+    which hair begins, where that is not the one at which it is cut.
     """
 
     roots: Floats
@@ -72,6 +81,7 @@ class Comb:
     ears: bool = False
     pole: bool = False
     drape: Drape | None = None
+    edge: Depth | None = None
 
 
 @dataclass(frozen=True)
@@ -107,8 +117,23 @@ def sheets(
         paths = _guides(skin, comb, layer, comb.ragged_mm * _waves(len(bulges), random, closed), bulges)
         points = _control_points(paths, weave)
         backed = 1.0 - _BACKED * k / max(len(layers) - 1, 1)
-        out.append(sheet(points, layer, weave, random, closed, sway, (backed * frayed[0], backed * frayed[1])))
+        made = sheet(points, layer, weave, random, closed, sway, (backed * frayed[0], backed * frayed[1]))
+        out.append(_thinned(made, comb.edge or comb.cut, layer.edge_mm, random) if layer.edge_mm > 0.0 else made)
     return out
+
+
+def _thinned(made: Patches, inside: Depth, edge_mm: float, random: np.random.Generator) -> Patches:
+    """A sheet whose cover falls to nothing over the last ``edge_mm`` before a line."""
+    at = surface_at(made.points[0], made.degrees, [np.linspace(0.0, 1.0, n) for n in made.grid])
+    left = inside(at.reshape(-1, 3)).reshape(made.grid)
+    wanders = 0.16 * edge_mm * random.standard_normal((made.grid[0], 1))
+    wanders[-1] = wanders[0]
+    x, _, z = np.moveaxis(at, 2, 0)
+    at_ear = np.exp(-((z / _EAR_MM) ** 2)) * step(np.abs(x), 50.0, 70.0)
+    gone = 1.0 - step((left + wanders) / (1.0 - _AT_EAR * at_ear), 0.0, edge_mm)
+    strands = made.strands.copy()
+    strands[0, ..., 2] -= (strands[0, ..., 2] + BARE) * gone
+    return replace(made, strands=strands)
 
 
 def _guides(skin: Skin, comb: Comb, layer: Layer, ragged: Floats, bulges: Floats) -> Floats:
@@ -189,9 +214,12 @@ def sheet(
     tiles = max(1.0, np.rint(wide * ACROSS)) if closed else wide * ACROSS
     start = random.uniform(0.0, 1.0, 2)
     locks = np.interp(u[:, 0], np.linspace(0, 1, 4 * nu), _waves(4 * nu, random, closed))[:, None]
+    many = max(4, round(float(wide) / _CLUMPS_MM))
+    clumps = np.interp(u[:, 0], np.linspace(0, 1, many), _waves(many, random, closed))[:, None]
     lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
     own = np.interp(u[:, 0], np.linspace(0, 1, nu), lengths)[:, None]
-    fray = np.minimum(layer.fray_mm * (1.0 - 0.3 * locks.clip(-1, 1)) / own, 0.9)
+    longer = 1.0 - 0.3 * locks.clip(-1, 1) - _CLUMPED * clumps.clip(-1, 1)
+    fray = np.minimum(layer.fray_mm * longer / own, 0.9)
     cover = layer.cover * (1.0 + 0.10 * locks) - (layer.cover + BARE) * np.clip((t - 1.0 + fray) / fray, 0.0, 1.0)
     for width, away in zip(frayed, (u, 1.0 - u), strict=True):
         if width > 0.0:
@@ -199,12 +227,12 @@ def sheet(
     if layer.roots > 0.0:
         uneven = 1.0 + _UNEVEN * _waves(gu, random, closed)[:, None]
         cover = cover - layer.roots * (1.0 - step(t * own / uneven, 0.0, layer.roots_mm))
-    opened = layer.openness * (0.86 + 0.14 * step(t, 0.0, 0.4)) * (1.0 + 0.05 * locks)
+    opened = layer.openness * (1.0 - _ROOTED[0] * (1.0 - step(t, 0.0, _ROOTED[1]))) * (1.0 + 0.05 * locks)
     ends = np.exp(-(1.0 - t) * own / max(layer.cropped_mm, 1e-9))
     opened = opened * (1.0 - _CLOSER * ends) if layer.cropped_mm > 0.0 else opened
     along = start[1] + ALONG * (float(np.median(lengths)) * t + _CROPPED * layer.cropped_mm * ends)
     strands = np.stack([start[0] + tiles * u, along, cover, opened + 0.0 * t], axis=-1)
-    shade = 1.0 + 0.06 * locks + 0.0 * t
+    shade = 1.0 + _SHADED[0] * clumps + _SHADED[1] * locks + 0.0 * t
     moved = np.broadcast_to(sway * np.linspace(0, 1, nv) ** 1.5, (nu, nv))
     return Patches(
         points[None], (3, 3), weave.grid, weave.fast, strands[None], (t**1.5)[None], shade[None], moved[None]

@@ -11,19 +11,27 @@ from surface.base.arrays import Floats
 from surface.fit.wardrobe.hairline import POINTS, RECEDED, SLANTED, Hairline
 from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheets, tips
 from surface.fit.wardrobe.skin import CENTRE, Skin, unit
+from surface.fit.wardrobe.strays import Strays, strays
 from surface.fit.wardrobe.styles import Style, step, tangent
 
 CROWN = np.array([12.0, 132.0, -42.0])
 RING_RAD = 0.05  # from the crown, seen from the skull's middle: where guides leave it
 GUIDES = 73
+FADE_MM = -4.0, 15.0  # of skin below a fringe, which is no dark patch where locks part at the temple
+STRAYS = Strays(36, 5.0, (0.04, 0.9))
+RAGGED_MM = 0.7  # by how much the line differs at which hair that is swept back begins
 CLOSE_MM = 0.9, 0.4  # over the skin, where hair ends at the line: at the sides and over the forehead
 _FLAT_MM = 2.0  # inside the line, over which hair that is swept back lies on the skin and begins to cover it
 _SPREADS, _EVEN = 3, 0.75  # how often guides are spread, and how evenly each time
 WEAVE = Weave((73, 12), (97, 15), (49, 9), 0.35)
-FRINGED = (Layer(1.08, 0.42, 1.0, 40.0), Layer(1.0, 0.66, 0.92, 24.0), Layer(0.90, 1.8, 0.80, 13.0))
+FRINGED = (
+    Layer(1.10, 0.44, 1.0, 42.0), Layer(1.0, 0.70, 0.88, 28.0, edge_mm=8.0),
+    Layer(0.88, 1.8, 0.70, 17.0, edge_mm=11.0),
+)  # fmt: skip
 SWEPT = (
-    Layer(1.10, 0.44, 1.0, 12.0, cropped_mm=7.0), Layer(1.0, 0.70, 0.92, 9.0, cropped_mm=7.0),
-    Layer(0.88, 1.8, 0.80, 6.0, cropped_mm=7.0),
+    Layer(1.10, 0.46, 1.0, 24.0, cropped_mm=7.0, edge_mm=7.0),
+    Layer(1.0, 0.72, 0.90, 18.0, cropped_mm=7.0, edge_mm=10.0),
+    Layer(0.88, 1.8, 0.76, 14.0, cropped_mm=7.0, edge_mm=14.0),
 )  # fmt: skip
 
 
@@ -41,7 +49,7 @@ class Sweep:
     layers: tuple[Layer, ...]
 
 
-BACK = Sweep(POINTS, 2.2, 6.5, 6.5, 0.45, 22.0, SWEPT)
+BACK = Sweep(POINTS, 2.2, 6.5, 5.5, 0.45, 30.0, SWEPT)
 THIN = Sweep(RECEDED, 2.6, 3.6, 0.8, 0.25, 34.0, SWEPT)
 
 
@@ -66,13 +74,14 @@ def short(skin: Skin) -> Style:
         return np.asarray(line.inside(at) + 1.0 + lower * fringe)
 
     def comb(round_it: Floats) -> Comb:
-        ragged = 0.4 + 3.0 * step(np.cos(round_it), 0.75, 0.95)  # in front
+        ragged = 1.4 + 3.6 * step(np.cos(round_it), 0.75, 0.95)  # in front
         return Comb(
-            _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, ragged, 1.2, 0.8, steps=66, slack=0.5,
+            _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, ragged, 2.2, 0.7, steps=66, slack=0.5,
             pole=True,
         )  # fmt: skip
 
-    return Style(sheets(skin, _spread(skin, comb), FRINGED, WEAVE, seed=11, closed=True), line)
+    made = sheets(skin, _spread(skin, comb), FRINGED, WEAVE, seed=11, closed=True)
+    return Style(made, line, fade=FADE_MM, strays=(strays(made[0], STRAYS, CENTRE, seed=12),))
 
 
 def swept(skin: Skin) -> Style:
@@ -110,11 +119,12 @@ def _swept_back(skin: Skin, sweep: Sweep, seed: int) -> Style:
 
     def comb(round_it: Floats) -> Comb:
         return Comb(
-            _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, 0.3, 1.2, 1.0, steps=66, slack=slack,
-            pole=True,
+            _ring(skin, round_it), np.full(GUIDES, 330.0), thickness, flow, cut, RAGGED_MM, 1.9, 1.0, steps=66,
+            slack=slack, pole=True,
         )  # fmt: skip
 
-    return Style(sheets(skin, _spread(skin, comb), sweep.layers, WEAVE, seed=seed, closed=True), line)
+    made = sheets(skin, _spread(skin, comb), sweep.layers, WEAVE, seed=seed, closed=True)
+    return Style(made, line, strays=(strays(made[0], STRAYS, CENTRE, seed=seed + 1),))
 
 
 def _spread(skin: Skin, comb: Callable[[Floats], Comb]) -> Comb:

@@ -24,14 +24,15 @@ BARE = (
 class Style:
     """A style: its patches, for :func:`surface.fit.wardrobe.patches.arrays`, and the line inside which it grows.
 
-    hanging : patches that are seen from both sides. fade : mm inside the line, from where the skin begins to have the
-    colour of hair to where it has it.
+    hanging : patches that are seen from both sides. strays : fins of stray hairs, seen from both sides, too. fade : mm
+    inside the line, from where the skin begins to have the colour of hair to where it has it.
     """
 
     patches: list[Patches]
     hairline: Hairline
     hanging: tuple[Patches, ...] = ()
     fade: tuple[float, float] = (-6.0, 8.0)
+    strays: tuple[Patches, ...] = ()
 
 
 def step(x: Floats, low: float, high: float) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from surface.fit.wardrobe.beards import field as beard_field
 from surface.fit.wardrobe.clothes import Neck, hidden_below
 from surface.fit.wardrobe.hairline import Hairline
 from surface.fit.wardrobe.patches import Patches, arrays
+from surface.fit.wardrobe.shade import shade
 from surface.fit.wardrobe.skin import ANCHORS, CENTRE, Skin, unit
 from surface.fit.wardrobe.styles import step
 from surface.head.model.sidecar import write_sidecar
@@ -46,15 +47,21 @@ def picture(skin: Skin, part: int, values: Floats) -> Floats:
     return np.asarray(values[own][near].mean(axis=1).reshape(SIZE, SIZE))
 
 
-def hair_fields(skin: Skin, line: Hairline, fade: tuple[float, float] = FADE_MM) -> dict[str, Floats]:
-    """Pictures of hair: skin between roots has its colour, and deep inside nobody sees it."""
+def hair_fields(
+    skin: Skin, line: Hairline, fade: tuple[float, float] = FADE_MM, patches: Sequence[Patches] = ()
+) -> dict[str, Floats]:
+    """Pictures of hair: skin between roots has its colour, deep inside nobody sees it, and what lies beside ``patches``
+    lies in their shade."""
     inside = line.inside(skin.points)
     inside = np.where((skin.normals * (skin.points - (0, 40, 0))).sum(axis=1) > -20.0, inside, -50.0)
     inside = np.where(_stands_out(skin), -50.0, inside)
     cover, hidden = step(inside, *fade), step(inside, HIDDEN_MM - 0.5, HIDDEN_MM + 0.5)
+    dark = shade(skin, patches) * (1.0 - cover) if patches else None
     out = {}
     for k, name in enumerate(ANCHORS):
         out[f"cover/{name}"] = picture(skin, k, cover)
+        if dark is not None:
+            out[f"shadow/{name}"] = picture(skin, k, dark)
         out[f"hidden/{name}"] = picture(skin, k, hidden)
     return out
 

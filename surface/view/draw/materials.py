@@ -364,7 +364,7 @@ MATERIALS: dict[str, Material] = {
     "skin": Material("skin", _skin_static, _skin_uniforms, order=0),
     "eye": Material("eye", lambda part, theme, openings: {"local": openings.local(part)}, _eye_uniforms, order=1),
     "lash": _hair("lash", (0.85, 0.15, 0.0, 0.0)),
-    "brow": _hair("brow", (0.70, 0.46, 0.36, 1.7), 1.0),
+    "brow": _hair("brow", (0.52, 0.36, 0.34, 0.92), 1.0),
     "teeth": _inner((0.76, 0.71, 0.62), 0.3, 0.30, _necked, order=3),
     "tongue": _inner((0.53, 0.20, 0.18), 0.4, 0.42, _grooved, order=4),
     "gums": _inner((0.57, 0.25, 0.23), 0.3, 0.20, order=5),

@@ -34,9 +34,9 @@ def dressed() -> Head:
 
 @pytest.mark.slow
 def test_worn_parts_have_their_colours_and_lie_near_the_head(dressed: Head) -> None:
-    names = [part.name for part in dressed.parts[-4:]]
-    assert names == ["hair", "tresses", "beard", "clothes"]
-    for part in dressed.parts[-4:]:
+    names = [part.name for part in dressed.parts[-5:]]
+    assert names == ["hair", "tresses", "strays", "beard", "clothes"]
+    for part in dressed.parts[-5:]:
         assert np.isfinite(part.vertices).all() and np.abs(part.vertices).max() < 400
         assert part.attributes["albedo"].mean(axis=0).argmax() == 2
         assert {"strands", "along", "gloss"} <= set(part.attributes)

@@ -13,9 +13,10 @@ out vec2 v_uv;
 void main() {
     gl_Position = view_projection * vec4(position, 1.0);
     vec3 v = normalize(camera - position);
-    vec3 n = dot(normal, v) < -0.35 ? -normal : normal;  // the inside; at the outline normals of the outside face away, too
+    float facing = dot(normal, v);
+    vec3 n = facing < -0.35 ? -normal : normal;  // the inside; at the outline normals of the outside face away, too
     vec3 albedo = albedo_gloss.rgb * albedo_gloss.rgb;
-    float open = strands.w;
+    float open = strands.w * (1.0 - 0.7 * smoothstep(-0.05, 0.12, -facing));  // little light gets inside
     float edge = 1.0 - clamp(dot(n, v), 0.0, 1.0);
     edge *= edge * edge;
     vec3 light = key_colour * clamp(0.85 * dot(n, key_direction) + 0.15, 0.0, 1.0);

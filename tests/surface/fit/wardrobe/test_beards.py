@@ -76,8 +76,8 @@ def test_skin_between_hairs_has_the_beard_s_colour_where_it_grows(name: str, ski
     assert cover.shape == (len(skin.points),) and not cover[skin.part != 0].any()
     own = skin.part == 0
     deep = inside(skin.points)
-    np.testing.assert_allclose(cover[own & (deep > 11.0)], beard.cover)
-    assert not cover[deep < -7.0].any() and cover.max() <= beard.cover
+    np.testing.assert_allclose(cover[own & (deep > module._FIELD_MM[1])], beard.cover)
+    assert not cover[deep < module._FIELD_MM[0]].any() and cover.max() <= beard.cover
 
 
 def test_values_between_the_places_of_a_grid_are_straight() -> None:

@@ -74,7 +74,7 @@ def test_sheets_lie_over_one_another_and_end_where_they_are_cut() -> None:
         np.testing.assert_allclose(y[:, -1], height, atol=0.1)
         np.testing.assert_allclose(z[:, 0], 40.0 * greville(9, 3), atol=0.1)
     assert above.strands[..., 2].max() < below.strands[..., 2].max()  # gaps in the outer show the inner
-    assert above.strands[..., 3].min() > below.strands[..., 3].max()  # which is darker
+    assert (above.strands[..., 3] > below.strands[..., 3] + 0.1).all()  # which is darker
 
 
 def test_ends_are_ragged_and_strands_sparse_there() -> None:

@@ -57,7 +57,7 @@ def test_thin_hair_over_the_forehead_ends_on_the_skin(root: Path) -> None:
 
 def test_beards_lie_close_to_the_skin_at_the_ears(root: Path) -> None:
     beard = Dressed(root, "beard-full")
-    side = (np.degrees(np.arctan2(np.abs(beard.at[:, 0]), beard.at[:, 2] - 20.0)) > 84.0) & (beard.cover > -0.25)
+    side = (np.degrees(np.arctan2(np.abs(beard.at[:, 0]), beard.at[:, 2] - 20.0)) > 78.0) & (beard.cover > -0.25)
     assert side.any() and beard.away[side].max() < 3.0
 
 
