@@ -10,7 +10,6 @@ from surface.base.jit import nonallocating
 from surface.head.model.data import Rule, Seal
 from surface.head.model.parameters import SHAPES, SIDES
 
-
 ROUNDS = {"mouthPucker": 1.2, "mouthFunnel": 0.7, "tongueOut": -2.0}
 """Shares of shapes in how round an open mouth is: the orbicularis draws the lips together at its corners."""
 _JAW, _TORN = SHAPES.index("jawOpen"), (0.3, 0.8)
