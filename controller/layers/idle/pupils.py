@@ -44,7 +44,7 @@ class Follower:
 
     def __init__(self) -> None:
         self.now: Life = REST
-        self._last_s = -math.inf
+        self._last_s = math.inf  # the first step has no length
 
     def follow(self, wanted: Life, now_s: float) -> None:
         """Go towards ``wanted`` until ``now_s``, where idle motion is if it did not jump."""

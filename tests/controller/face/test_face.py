@@ -229,3 +229,12 @@ def test_a_picture_that_took_too_long_is_followed_by_the_next_at_once(
     finally:
         face.close()
     assert began == [0, 100_000_000, 350_000_000, 450_000_000]
+
+
+def test_breath_and_pupils_of_the_mailbox_are_those_of_the_values() -> None:
+    with Mailbox.create(len(PARAMETERS.names)) as mailbox:
+        values = HeadValues(mailbox, PARAMETERS, ("jawOpen",))
+        mailbox.publish(PARAMETERS.neutral(), 7, (1.5, 0.1))
+        assert values.life == (0.0, 0.0)
+        values()
+        assert values.life == (1.5, 0.1)
