@@ -11,7 +11,6 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.base.errors import HeadFileError
 from surface.head.model.accessories import read_accessories
-from surface.head.model.breath import STEP_MM, WIDEST
 from surface.head.model.data import Contact, Group, HeadData, PartData
 from surface.head.model.file import load_data
 from surface.head.model.finer_mesh import FinerMesh
@@ -24,7 +23,7 @@ from surface.head.model.parameters import NAMES, SHAPES, Pose, read_pose, rotati
 from surface.head.model.rounding import with_rounder_skin
 from surface.head.model.rules import Drivers
 from surface.head.model.sidecar import DAMAGED, reason
-from surface.head.model.sway import Sway
+from surface.head.model.sway import STEP_MM, WIDEST, Sway
 from surface.head.model.texture import HeadTexture, read_texture
 from surface.head.model.wardrobe import read_garment, with_garments
 from surface.head.posing.appearance import apply_look, apply_texture
@@ -189,7 +188,7 @@ class Head:
         """Breathe and change the pupils in pictures from now on, beside the parameters.
 
         rise_mm : by which a breath lifts the chest. pupil : share by which both pupils are wider than the light makes
-        them, within :data:`surface.head.model.breath.WIDEST`; 0 for both is rest.
+        them, within :data:`surface.head.model.sway.WIDEST`; 0 for both is rest.
         """
         self.rise_mm = round(rise_mm / STEP_MM) * STEP_MM
         self.pupil = min(max(pupil, -WIDEST), WIDEST)

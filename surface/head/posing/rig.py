@@ -9,13 +9,12 @@ import numpy as np
 
 from surface.base.addresses import make_table
 from surface.base.arrays import Floats
-from surface.head.model.breath import breath_moves
 from surface.head.model.data import HeadData, Jaw, PartData
 from surface.head.model.meshes import domain_of, make_surface
 from surface.head.model.own_groups import OwnMoves
 from surface.head.model.parameters import SHAPES, Pose, rotation
 from surface.head.model.rules import Drivers, SealDriver
-from surface.head.model.sway import SWAYS
+from surface.head.model.sway import SWAYS, breath_moves
 from surface.head.posing.contact import FORWARD, LID_MM, ContactSolver, EyeballClearance, Follower
 from surface.head.posing.kernels import hold_lids, swing_jaw
 from surface.head.posing.moves import Moves

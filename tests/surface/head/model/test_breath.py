@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from surface.head.model.breath import breath_moves
 from surface.head.model.data import Neck
+from surface.head.model.sway import breath_moves
 
 NECK = Neck((0.0, -55.0, -5.0))
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from small_head import JAW, all_points, part, small_head
 
-from surface.head.model.breath import breath_moves
 from surface.head.model.data import Contact, Neck, Seam
 from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import NAMES, read_pose
+from surface.head.model.sway import breath_moves
 from surface.head.posing import rig as rig_module
 from surface.head.posing.rig import LID_MM, SkinRig, jaw_path, rigid_motion
 
