@@ -2,7 +2,7 @@
 
 Layout of the mapped file, all native 8-byte words::
 
-    sequence i64 | spare i64 | slot 0: stamp_ns i64, count x f64 | slot 1: the same
+    sequence i64 | spare i64 | slot 0: stamp_ns i64, life 2 x f64, count x f64 | slot 1: the same
 
 The writer fills the slot that readers do not look at and then raises ``sequence``, so a reader never waits;
 it copies the slot ``sequence`` points at and reads again only if the writer lapped it meanwhile.
@@ -29,6 +29,12 @@ log = logging.getLogger(__name__)
 MEMORY = "/dev/shm"
 _HEADER = 2
 _RETRIES = 100
+_LIFE = 2
+
+Life = tuple[float, float]
+"""What the picture shows beside the parameters: mm by which a breath lifts the chest, and share by which pupils are
+wider than the light makes them."""
+REST: Life = (0.0, 0.0)
 
 
 class Mailbox:
@@ -38,22 +44,26 @@ class Mailbox:
     :meth:`receive`. The file has no name, so nothing of it is left however the processes end.
 
     file : the mapped file. count : length of the vector.
+
+    Attributes
+    ----------
+    life : what was published with the vector that was read last.
     """
 
     def __init__(self, file: IO[bytes], count: int) -> None:
-        self.count = count
+        self.count, self.life = count, REST
         self._file = file
         self._map = mmap.mmap(file.fileno(), self._size(count))
         words = np.frombuffer(self._map, dtype=np.int64)
         self._head = words[:_HEADER]
-        slot = 1 + count
+        slot = 1 + _LIFE + count
         self._stamps = words[_HEADER::slot][:2]
         values = np.frombuffer(self._map, dtype=np.float64)[_HEADER:].reshape(2, slot)
-        self._slots = values[:, 1:]
+        self._lives, self._slots = values[:, 1 : 1 + _LIFE], values[:, 1 + _LIFE :]
 
     @staticmethod
     def _size(count: int) -> int:
-        return 8 * (_HEADER + 2 * (1 + count))
+        return 8 * (_HEADER + 2 * (1 + _LIFE + count))
 
     @classmethod
     def create(cls, count: int) -> Mailbox:
@@ -80,10 +90,11 @@ class Mailbox:
         """How often the vector was published."""
         return int(self._head[0])
 
-    def publish(self, values: NDArray[np.float64], stamp_ns: int = 0) -> None:
-        """Replace the vector. ``values`` : (count,) float64; ``stamp_ns`` travels with it."""
+    def publish(self, values: NDArray[np.float64], stamp_ns: int = 0, life: Life = REST) -> None:
+        """Replace the vector. ``values`` : (count,) float64; ``stamp_ns`` and ``life`` travel with it."""
         following = int(self._head[0]) + 1
         self._slots[following % 2] = values
+        self._lives[following % 2] = life
         self._stamps[following % 2] = stamp_ns
         self._head[0] = following
 
@@ -92,14 +103,16 @@ class Mailbox:
         for _ in range(_RETRIES):
             sequence = int(self._head[0])
             out[:] = self._slots[sequence % 2]
+            rise_mm, pupil = self._lives[sequence % 2].tolist()
             stamp = int(self._stamps[sequence % 2])
             if int(self._head[0]) - sequence < 1:
                 break
+        self.life = rise_mm, pupil
         return sequence, stamp
 
     def close(self) -> None:
         """Unmap the memory; it is free when every process has."""
-        del self._head, self._stamps, self._slots
+        del self._head, self._stamps, self._lives, self._slots
         self._map.close()
         self._file.close()
 

@@ -335,7 +335,8 @@ class Body:
         is_new, self._newest = stamp > self._newest[1], (values, stamp)
         for bus in self.buses:
             bus.feed(step_s, urgent=is_new)
-        self._mailbox.publish(values, stamp)
+        shown = self.state if self.replay is None or not begun else self.replay
+        self._mailbox.publish(values, stamp, shown.beside)
 
     def _tick_layers(self, now_ns: int, dt: float, values: Floats, begun: bool) -> int:
         """Write the face of the layers or of a recording to ``values`` : (P,); return the newest command's time (ns).

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from controller.base.clock import Clock, Samples
 from controller.base.errors import ControllerError
-from controller.base.mailboxes import Mailbox
+from controller.base.mailboxes import REST, Life, Mailbox
 from controller.base.parameters import Floats, Parameters
 from controller.stage.stage import FaceSettings
 
@@ -59,6 +59,11 @@ class HeadValues:
     def follow(self, wanted: Sequence[str]) -> None:
         """Select the parameters of another head; ``wanted`` : their names."""
         self._indices, self.values = head_indices(self._parameters, wanted), np.zeros(len(wanted))
+
+    @property
+    def life(self) -> Life:
+        """Breath and pupils that belong to the values of the last call."""
+        return self._mailbox.life
 
     def listen(self, mailbox: Mailbox) -> None:
         """Read another mailbox of the same parameters."""
@@ -222,6 +227,7 @@ class HeadlessFace:
         for now in Clock(self._settings.fps, prompt=True).run(keep_going):
             values, time_s = self._values(), (now - started) / 1e9
             self._head.sway.advance(self._angles(values), time_s)
+            self._head.live(*getattr(self._values, "life", REST))
             self._screen.draw(values, self._camera)
             if self._recorder is not None and self._recorder.wants(time_s):
                 self._recorder.keep(self._screen.read(), time_s)

@@ -66,12 +66,13 @@ class LiveWall:
         assert self._picture is not None and self._placing is not None
         for mailbox, row in zip(self._mailboxes, self._rows, strict=True):
             mailbox.read(row[:-1])
+        lives = np.array([mailbox.life for mailbox in self._mailboxes])
         boxes = [_from_below(box, size) for box in self.boxes(size)]
         for group in self._groups:
             group.posed = False
         ends_s = time.perf_counter() + FRAME_S
         for drawn, (group, place) in enumerate(self._turns, start=1):
-            group.draw(self._rows, place, boxes[place][2:])
+            group.draw(self._rows, lives, place, boxes[place][2:])
             self._placing.copy(self._picture, group.drawing.target.picture, boxes[place])
             if time.perf_counter() >= ends_s:
                 self._turns = self._turns[drawn:] + self._turns[:drawn]
@@ -122,8 +123,9 @@ class _Group:
         self.posed = False
         self._tile, self._camera = (0, 0), Camera.front()
 
-    def draw(self, rows: Floats, place: int, tile: tuple[int, int]) -> None:
-        """Draw head ``place`` of the stage in the pose of its row of ``rows (n, P + 1)``, as large as a tile, pixels.
+    def draw(self, rows: Floats, lives: Floats, place: int, tile: tuple[int, int]) -> None:
+        """Draw head ``place`` of the stage in the pose of its row of ``rows (n, P + 1)``, with its breath and pupils in
+        ``lives (n, 2)``, as large as a tile, pixels.
 
         Heads that are posed in one batch are so once for all, until ``posed`` is set to False.
         """
@@ -133,11 +135,12 @@ class _Group:
         if self._crowd is None:
             values = rows[place, self._loaded.order]
             self._head.sway.advance(head_angles(values), time.monotonic())
+            self._head.live(*lives[place].tolist())
             self.drawing.draw(values, self._camera)
             return
         if not self.posed:
             self.posed = True
-            self._crowd.pose(rows[self.places][:, self._loaded.order])
+            self._crowd.pose(rows[self.places][:, self._loaded.order], lives[self.places])
         self._crowd.show(self.places.index(place))
         self.drawing.draw_present(self._camera)
 

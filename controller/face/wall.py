@@ -65,20 +65,23 @@ class _Alike:
         )  # fmt: skip
         return self.screen
 
-    def draw(self, rows: Floats, time_s: float) -> None:
+    def draw(self, rows: Floats, time_s: float, lives: Floats) -> None:
         """Draw a frame of a single head without reading it back; does nothing for a crowd."""
         if self.crowd is None and self.screen is not None:
             values = self._select(rows)[0]
             self.head.sway.advance(head_angles(values), time_s)
+            self.head.live(*lives[0].tolist())
             self.screen.draw(values, self.camera)
 
-    def pictures(self, rows: Floats, *, drawn: bool) -> list[Image]:
-        """Return one picture for each head; ``rows`` : (h, P) values. drawn : whether :meth:`draw` has drawn them."""
+    def pictures(self, rows: Floats, lives: Floats, *, drawn: bool) -> list[Image]:
+        """Return one picture for each head; ``rows`` : (h, P) values, ``lives`` : (h, 2). drawn : whether :meth:`draw`
+        has drawn them."""
         assert self.screen is not None
         values = self._select(rows)
         if self.crowd is None:
+            self.head.live(*lives[0].tolist())
             return [self.screen.read() if drawn else self.screen.render(values[0], self.camera)]
-        self.crowd.pose(values)
+        self.crowd.pose(values, lives)
         found = []
         for k in range(len(self.crowd)):
             self.crowd.show(k)
@@ -153,22 +156,26 @@ class Wall:
         assert first is not None
         self.renderer = first.ctx.info["GL_RENDERER"]
 
-    def draw(self, rows: Floats, time_s: float) -> None:
+    def draw(self, rows: Floats, time_s: float, lives: Floats | None = None) -> None:
         """Draw a frame of the heads that look like no other; the others are drawn by :meth:`pictures`.
 
-        rows : (n, P) full parameter vectors, in the order of the stage.
+        rows : (n, P) full parameter vectors, in the order of the stage. lives : (n, 2) breath and pupils of each, see
+        :meth:`surface.head.Head.live`; None: at rest.
         """
+        beside = np.zeros((len(rows), 2)) if lives is None else lives
         for alike in self._alike:
-            alike.draw(rows[alike.places], time_s)
+            alike.draw(rows[alike.places], time_s, beside[alike.places])
 
-    def pictures(self, rows: Floats, *, drawn: bool = False) -> list[Image]:
+    def pictures(self, rows: Floats, lives: Floats | None = None, *, drawn: bool = False) -> list[Image]:
         """Return a picture (h, w, 3) uint8 of each head, in the order of the stage file.
 
-        rows : (n, P) full parameter vectors. drawn : whether :meth:`draw` has drawn this frame.
+        rows, lives : as :meth:`draw`. drawn : whether it has drawn this frame.
         """
         found: dict[int, Image] = {}
+        beside = np.zeros((len(rows), 2)) if lives is None else lives
         for alike in self._alike:
-            found.update(zip(alike.places, alike.pictures(rows[alike.places], drawn=drawn), strict=True))
+            places = alike.places
+            found.update(zip(places, alike.pictures(rows[places], beside[places], drawn=drawn), strict=True))
         return [found[i] for i in range(len(rows))]
 
     @property
@@ -214,11 +221,12 @@ class WallFace:
         for now in Clock(self._settings.fps, prompt=True).run(keep_going):
             stamps = [mailbox.read(row)[1] for mailbox, row in zip(self._mailboxes, self._rows, strict=True)]
             time_s = (now - started) / 1e9
-            self._wall.draw(self._rows, time_s)
+            lives = np.array([mailbox.life for mailbox in self._mailboxes])
+            self._wall.draw(self._rows, time_s, lives)
             if self._recorder is not None and self._recorder.wants(time_s):
-                self._recorder.keep(self._wall.join(self._wall.pictures(self._rows, drawn=True)), time_s)
+                self._recorder.keep(self._wall.join(self._wall.pictures(self._rows, lives, drawn=True)), time_s)
             elif self._wall.crowded:
-                self._wall.pictures(self._rows, drawn=True)
+                self._wall.pictures(self._rows, lives, drawn=True)
             self._log.add(self._rows, now, time.monotonic_ns(), max(stamps))
 
     def close(self) -> None:

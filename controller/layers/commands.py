@@ -16,6 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from controller.base.errors import ParameterError
+from controller.base.mailboxes import Life
 from controller.base.parameters import Flags, Floats, Parameters
 from controller.base.parts import Parts
 from controller.base.placement import Placement
@@ -156,6 +157,11 @@ class CommandState:
         gaze = self._sources.gaze
         yaw, pitch = gaze.direction_deg
         return (math.radians(yaw), math.radians(pitch)) if gaze.active else None
+
+    @property
+    def beside(self) -> Life:
+        """Breath and pupils, which pictures show beside the parameters."""
+        return self._sources.beside.now
 
     @property
     def liveliness(self) -> float:

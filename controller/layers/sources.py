@@ -12,6 +12,7 @@ from controller.base.parts import Parts
 from controller.layers.expression_player import ExpressionPlayer
 from controller.layers.gaze import Gaze
 from controller.layers.idle.motion import IdleMotion
+from controller.layers.idle.pupils import Follower
 from controller.layers.idle.settings import IdleSettings
 from controller.layers.layer_part import LayerPart
 from controller.layers.mixer import Layer, Mixer
@@ -28,7 +29,7 @@ class Sources:
     Attributes
     ----------
     player : plays expressions. gaze : looks in a direction or at a point. life : idle motion. Each is replaced by a new
-    object after it failed.
+    object after it failed. beside : breath and pupils, which pictures show beside the parameters.
     """
 
     def __init__(
@@ -46,7 +47,7 @@ class Sources:
         self._life_settings, self._seed, self._parts = life, seed, parts
         self.player = ExpressionPlayer(vocabulary["neutral"])
         self.gaze = Gaze(parameters)
-        self.life = IdleMotion(parameters, life, seed)
+        self.life, self.beside = IdleMotion(parameters, life, seed), Follower()
         self._expression, self._looking = mixer["expression"], mixer["gaze"]
         self._idle, self._speech, self._jaw = mixer["idle"], mixer["speech"], parameters.index("jawOpen")
         self._everything = np.ones(len(parameters), dtype=bool)
@@ -67,6 +68,7 @@ class Sources:
         self._speech.attenuate(mouth)
         for source in self._others:
             source.update(now_s)
+        self.beside.follow(self.life.beside, now_s)
 
     def stop_looking(self, fade_s: float | None = None) -> None:
         """Look at nothing, and fade out the layer over ``fade_s``; None: over the layer's own fade-out time."""

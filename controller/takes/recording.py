@@ -17,6 +17,7 @@ import numpy as np
 
 from controller.base.errors import ControllerError
 from controller.base.files import format_fault
+from controller.base.mailboxes import REST, Life
 from controller.base.parameters import Floats, Parameters
 from controller.layers.commands import CommandState
 from controller.takes.line_writer import LineWriter
@@ -122,12 +123,13 @@ class Replay:
     """Plays a recording in real time in place of a command state, without taking commands; see :func:`replay`.
 
     finished : whether the last tick has been played. ticks : number of ticks played. played_s : time of the last one
-    since the first.
+    since the first. beside : breath and pupils of the last one, see :class:`controller.layers.commands.CommandState`.
     """
 
     def __init__(self, path: Path, parameters: Parameters, make: Maker = _default_state) -> None:
-        self._ticks = replay(path, parameters, make=make)
-        self._next = self._read_next()
+        self._states: list[CommandState] = []
+        self._ticks = replay(path, parameters, make=lambda *how: self._keep(make(*how)))
+        self._next, self.beside = self._read_next(), REST
         self._start_ns = (0, 0)
         self.finished = False
         self.ticks, self.played_s = 0, 0.0
@@ -138,16 +140,20 @@ class Replay:
             self._start_ns = now_ns, self._next[0]
         start_ns, first = self._start_ns
         while self._next is not None and self._next[0] - first <= now_ns - start_ns:
-            out[:] = self._next[1]
+            out[:], self.beside = self._next[1:]
             self.played_s = (self._next[0] - first) * 1e-9
             self.ticks += 1
             self._next = self._read_next()
         self.finished = self._next is None
         return 0
 
-    def _read_next(self) -> tuple[int, Floats] | None:
+    def _keep(self, state: CommandState) -> CommandState:
+        self._states.append(state)
+        return state
+
+    def _read_next(self) -> tuple[int, Floats, Life] | None:
         found = next(self._ticks, None)
-        return None if found is None else (found[0], found[1].copy())
+        return None if found is None else (found[0], found[1].copy(), self._states[0].beside)
 
 
 def _apply(state: CommandState, items: list[Any]) -> None:

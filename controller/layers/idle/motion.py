@@ -11,13 +11,15 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from controller.base.mailboxes import REST, Life
 from controller.base.parameters import Floats, Parameters
 from controller.layers.idle.attention import Attention, Shift
 from controller.layers.idle.blinks import Blinks
 from controller.layers.idle.draws import MAX_GAP_S, generator
 from controller.layers.idle.eyes import Eyes
 from controller.layers.idle.gestures import Gestures
-from controller.layers.idle.head import Nods, Posture, Sway, Turn
+from controller.layers.idle.head import Nods, Posture, Sway, Turn, lung_volume
+from controller.layers.idle.pupils import Pupils
 from controller.layers.idle.settings import IdleSettings, Manner, MannerSettings
 from controller.layers.idle.speech import Emphasis, SpeechDetector
 from controller.vocabulary.sides import spread
@@ -41,7 +43,7 @@ class IdleMotion:
     chosen : the commanded manner; None: ``speak`` while the face speaks, ``listen`` for a time after that, else
     ``alone``. manner : the current manner.
     eye_yaw_rad, eye_pitch_rad : offset of the eyes from their target by micro-saccades and drift.
-    head_rad : (3,) yaw, pitch, roll of the head.
+    head_rad : (3,) yaw, pitch, roll of the head. beside : what pictures show beside the parameters: breath and pupils.
     """
 
     def __init__(self, parameters: Parameters, settings: IdleSettings, seed: int = 0) -> None:
@@ -51,6 +53,7 @@ class IdleMotion:
         self.manner: Manner = "alone"
         self.eye_yaw_rad = self.eye_pitch_rad = 0.0
         self.head_rad = np.zeros(3)
+        self.beside: Life = REST
         self._settings, self._last_s, self._was_looking = settings, -math.inf, False
         self._lids = parameters.indices(["eyeBlinkLeft", "eyeBlinkRight"])
         self._along = spread(parameters, settings.blink.along)
@@ -64,6 +67,7 @@ class IdleMotion:
         self._eyes = Eyes(settings.eyes, generator(seed, "eyes"))
         self._turn, self._posture = Turn(settings.turn), Posture(settings.posture, generator(seed, "posture"))
         self._sway = Sway(settings.head, settings.breath, generator(seed, "sway"))
+        self._pupils = Pupils(settings.pupil, settings.breath, generator(seed, "pupils"))
         self._nods = Nods(settings.nod, generator(seed, "nods"))
         self._fidgets = Gestures(parameters, settings.fidget, generator(seed, "fidgets"))
         self._smiles = Gestures(parameters, settings.smile, generator(seed, "smiles"))
@@ -94,11 +98,15 @@ class IdleMotion:
         self._advance(now_s, looking)
         self._write_face(now_s, 1.0 - blink_block)
         self._write_head(now_s, 1.0 - gaze_block, looking)
+        breath = self._settings.breath
+        rise_mm = self.liveliness * breath.rise_mm * lung_volume(breath, now_s)
+        self.beside = rise_mm, self.liveliness * self._pupils.at(now_s)
         return self.values
 
     def _rest(self) -> None:
         self.eye_yaw_rad = self.eye_pitch_rad = 0.0
         self.head_rad[:] = 0.0
+        self.beside = REST
         self._last_s = -math.inf
 
     @property

@@ -32,6 +32,9 @@ Fractions = Annotated[tuple[Fraction, Fraction], AfterValidator(in_order)]
 Angles = Annotated[tuple[Degrees, Degrees], AfterValidator(in_order)]
 Period = Annotated[Number, Field(ge=0.1, le=3600)]
 Periods = Annotated[tuple[Period, Period], AfterValidator(in_order)]  # times are divided by them
+Hertz = Annotated[Number, Field(ge=0.005, le=5)]
+Band = Annotated[tuple[Hertz, Hertz], AfterValidator(in_order)]
+Share = Annotated[Number, Field(ge=0, le=0.2)]
 
 
 def check_manner(name: str | None) -> Manner | None:
@@ -128,6 +131,15 @@ class BreathSettings(Settings):
     exhale_s: Seconds
     pause_s: Seconds
     pitch_deg: Degrees
+    rise_mm: Annotated[Number, Field(ge=0, le=10)]
+
+
+class PupilSettings(Settings):
+    slow_hz: Band
+    slow: Share
+    fast_hz: Band
+    fast: Share
+    breath: Share
 
 
 class NodSettings(Settings):
@@ -190,6 +202,7 @@ class IdleSettings(Settings):
     posture: PostureSettings
     head: HeadSettings
     breath: BreathSettings
+    pupil: PupilSettings
     nod: NodSettings
     fidget: FidgetSettings
     smile: GestureSettings

@@ -125,6 +125,7 @@ class WindowFace:
             values = self._values()
             now = time.monotonic_ns()
             self._head.sway.advance(head_angles(values), now / 1e9)
+            self._head.live(*self._values.life)
             if began:
                 self._log.add(values, began, now, stamp)  # the frame before has been drawn by now
             began, stamp = now, self._values.stamp_ns

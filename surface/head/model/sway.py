@@ -1,4 +1,5 @@
-"""Hair that lags behind the head: a damped spring for each of the head's angles."""
+"""What moves beside the parameters: hair that lags behind the head, a damped spring for each of the head's angles, and
+a bust that rises with each breath, a displacement by place, so that every head whose neck ends in one has it."""
 
 from __future__ import annotations
 
@@ -7,12 +8,21 @@ from math import cos, exp, pi, sin, sqrt
 import numpy as np
 
 from surface.base.arrays import Floats
+from surface.head.model.data import Neck
+from surface.head.model.parameters import smoothstep
 
 SWAYS = ("swayYaw", "swayPitch", "swayRoll")
 """Groups of what sways, per radian by which it lies ahead of the head."""
 _AXES = np.eye(3)[[1, 0, 2]]  # yaw turns about y, pitch about x, roll about z
 _HZ, _DAMPING = 2.1, 0.38  # of hair as long as a head, chosen by eye; damping 1 has no overshoot
 _MAX_RAD, _MAX_S = 0.16, 0.5
+STEP_MM = 1.0 / 64.0
+"""Breaths that differ by less are drawn alike, so that a chest that hardly moves is not computed again."""
+WIDEST = 0.25
+"""Share by which pupils may be wider or narrower than the light makes them."""
+_FRONT = -0.6, 0.9  # from the neck's pivot, in lengths of the neck's bend: from behind it to the breast bone
+_SIDE, _HALF = 0.35, 1.7  # how far shoulders go outwards, and half the width of a bust, in the same lengths
+_LEAST = 1e-4
 
 
 def sway_moves(points: Floats, share: Floats, pivot: tuple[float, float, float]) -> Floats:
@@ -50,3 +60,20 @@ class Sway:
         self._speed = fall * (self._speed * c - (_DAMPING * own * pull + turned * lag) * s)
         if np.abs(self.lag).max() < 1e-4 and np.abs(self._speed).max() < 1e-3:  # at rest nothing is drawn again
             self.lag, self._speed = np.zeros(3), np.zeros(3)
+
+
+def breath_moves(points: Floats, neck: Neck) -> Floats:
+    """Return (n, 3): displacement of points at rest (n, 3) for each mm by which the chest rises.
+
+    Where the neck follows the head nothing moves, and from there down more and more. The front goes up and forwards
+    alike, as the third ribs do, less to the sides (De Groote et al., "Chest wall motion during tidal breathing", J.
+    Appl. Physiol. 83, 1997); the back goes up only.
+    """
+    length = neck.whole - neck.still
+    share = (1.0 - neck.share(points)) ** 2
+    local = (points - np.array(neck.pivot)) / length
+    front = smoothstep(local[:, 2], *_FRONT)
+    side = _SIDE * np.clip(local[:, 0] / _HALF, -1.0, 1.0)
+    moves: Floats = share[:, None] * np.column_stack([side, 0.6 + 0.4 * front, front])
+    moves[np.abs(moves).max(axis=1, initial=0.0) < _LEAST] = 0.0
+    return moves

@@ -59,7 +59,7 @@ class Crowd:
         at = {id(part): i for i, part in enumerate(head.parts)}
         self._stitches = [(stitch, at[id(stitch.first)], at[id(stitch.second)]) for stitch in head.stitches]
         self._turns: list[Turn] = [Turn(np.eye(3), head.data.neck.pivot)] * count
-        self._values = np.tile(neutral, (count, 1))
+        self._values, self._lives = np.tile(neutral, (count, 1)), np.zeros((count, 2))
         self.values = self._values.view()
         self.values.flags.writeable = False
 
@@ -72,9 +72,11 @@ class Crowd:
         """Bytes of all heads, without what they share."""
         return sum(part.nbytes for part in self.parts)
 
-    def pose(self, values: Floats) -> list[int]:
+    def pose(self, values: Floats, lives: Floats | None = None) -> list[int]:
         """Move every head to its parameter values (h, P), clipped to their ranges; return the heads whose values
-        changed.
+        or breath changed.
+
+        lives : (h, 2) what :meth:`surface.head.Head.live` takes, of each head; None: at rest.
 
         Raises ValueError: wrong shape or a value that is not a number; the heads keep their poses.
         """
@@ -83,8 +85,11 @@ class Crowd:
             raise ValueError(f"values has shape {given.shape}, expected {self._values.shape}")
         for row in given[np.isnan(given).any(axis=1)]:
             self.head.read_pose(row)  # raises, before anything moves
-        moved = np.flatnonzero((given != self._values).any(axis=1)).tolist()
-        poses = [self.head.read_pose(given[k]) for k in moved]
+        lives = np.zeros_like(self._lives) if lives is None else lives
+        breathes = lives[:, 0] != self._lives[:, 0]
+        moved = np.flatnonzero((given != self._values).any(axis=1) | breathes).tolist()
+        self._lives = np.array(lives, float)
+        poses = [self._read_pose(k, given[k]) for k in moved]
         points = {c.part.name: c.part.rig.move_all(poses) for c in self.parts if moved and isinstance(c.part, SkinPart)}
         finishing = [
             self._place(k, pose, {name: rows[i] for name, rows in points.items()})
@@ -98,8 +103,14 @@ class Crowd:
         self._values[moved] = given[moved]
         return moved
 
+    def _read_pose(self, k: int, values: Floats) -> Pose:
+        """Return values (P,) as a pose of head k, with its breath."""
+        self.head.live(*self._lives[k].tolist())
+        return self.head.read_pose(values)
+
     def show(self, k: int) -> None:
-        """Give the template head the vertices and normals of head k, until it is posed again."""
+        """Give the template head the vertices, normals and pupils of head k, until it is posed again."""
+        self.head.live(*self._lives[k].tolist())
         for crowd in self.parts:
             crowd.part.show(crowd.vertices[k], crowd.normals[k], self._turns[k])
 

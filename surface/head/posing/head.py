@@ -23,7 +23,7 @@ from surface.head.model.parameters import NAMES, SHAPES, Pose, read_pose, rotati
 from surface.head.model.rounding import with_rounder_skin
 from surface.head.model.rules import Drivers
 from surface.head.model.sidecar import DAMAGED, reason
-from surface.head.model.sway import Sway
+from surface.head.model.sway import STEP_MM, WIDEST, Sway
 from surface.head.model.texture import HeadTexture, read_texture
 from surface.head.model.wardrobe import read_garment, with_garments
 from surface.head.posing.appearance import apply_look, apply_texture
@@ -43,6 +43,7 @@ class Head:
 
     data : everything a head file holds; where : its path, for messages.
     sway : of its hair; a program that draws a moving picture gives it the time.
+    rise_mm, pupil : what :meth:`live` set.
     own_groups : what :meth:`add_groups` added.
     accessories : meshes that it wears as they are, such as glasses; no parts, because no control points move them.
     texture : of its skin and eyes, as its mesh brought it; None without one.
@@ -59,6 +60,7 @@ class Head:
         for stitch in self._stitches:
             stitch.close()
         self.sway = Sway()
+        self.rise_mm = self.pupil = 0.0
         self._own, self.own_groups = OwnAmounts(()), tuple[OwnGroup, ...]()
         self._at = {name: i for i, name in enumerate(self.parameters)}
         self._last_turn = b"", Turn(np.eye(3), data.neck.pivot)
@@ -182,14 +184,24 @@ class Head:
         for stitch in self._stitches:
             stitch.close()
 
+    def live(self, rise_mm: float, pupil: float) -> None:
+        """Breathe and change the pupils in pictures from now on, beside the parameters.
+
+        rise_mm : by which a breath lifts the chest. pupil : share by which both pupils are wider than the light makes
+        them, within :data:`surface.head.model.sway.WIDEST`; 0 for both is rest.
+        """
+        self.rise_mm = round(rise_mm / STEP_MM) * STEP_MM
+        self.pupil = min(max(pupil, -WIDEST), WIDEST)
+
     def read_pose(self, values: Floats) -> Pose:
-        """Return parameter values (P,) as a pose, with what sways where it is now; errors as :meth:`pose`."""
+        """Return parameter values (P,) as a pose, with what sways and the breath where they are now; errors as
+        :meth:`pose`."""
         given = np.asarray(values, float)
         if given.shape != (len(self.parameters),):
             raise ValueError(f"values has shape {given.shape}, expected ({len(self.parameters)},)")
         pose = read_pose(given[: len(NAMES)])
         pose.own = self._own(given)
-        pose.lag = self.sway.lag
+        pose.lag, pose.rise_mm = self.sway.lag, self.rise_mm
         return pose
 
     def own_amounts(self, values: Floats) -> Floats:

@@ -14,7 +14,7 @@ from surface.head.model.meshes import domain_of, make_surface
 from surface.head.model.own_groups import OwnMoves
 from surface.head.model.parameters import SHAPES, Pose, rotation
 from surface.head.model.rules import Drivers, SealDriver
-from surface.head.model.sway import SWAYS
+from surface.head.model.sway import SWAYS, breath_moves
 from surface.head.posing.contact import FORWARD, LID_MM, ContactSolver, EyeballClearance, Follower
 from surface.head.posing.kernels import hold_lids, swing_jaw
 from surface.head.posing.moves import Moves
@@ -52,6 +52,9 @@ class SkinRig:
         self.rest = np.ascontiguousarray(part.points, np.float64)
         self._drivers = drivers or Drivers(head.rules)
         self._moves, self._sways = Moves(part, self._drivers.names), Moves(part, SWAYS)
+        breath = breath_moves(part.points.astype(np.float64), head.neck)
+        self._breathing = np.flatnonzero(breath.any(axis=1))
+        self._breath = breath[self._breathing]
         self._open, self._jaw = part.jaw.astype(np.float64), head.jaw
         self._swings, self._whole = bool(self._open.any()), jaw_path(head.jaw, 1.0)
         self._undo = _undo_share(part)
@@ -139,8 +142,9 @@ class SkinRig:
         rests = self._rest is not None and self._rest.share(pose) > 0.0
         rest = (pose.lip.tobytes(), motion_key("jaw", self._head, pose)) if rests else ()
         lag = pose.lag.tobytes() if len(self._sways.used) else b""
+        rise = pose.rise_mm if len(self._breathing) else 0.0
         own = pose.own.tobytes() if self.own else b""
-        return self._amounts.tobytes(), *rest, jaw, gaze, lag, own, *seals, *pushes
+        return self._amounts.tobytes(), *rest, jaw, gaze, lag, rise, own, *seals, *pushes
 
     def _seal_amounts(self, pose: Pose) -> list[float]:
         """Return how firmly each contact of the part keeps its sides together in a pose."""
@@ -168,6 +172,8 @@ class SkinRig:
             np.copyto(self.points, moved)
         if len(self._sways.used) and pose.lag.any():
             self._sways.add(pose.lag[self._sways.used], self.points, self.points)
+        if len(self._breathing) and pose.rise_mm:
+            self.points[self._breathing] += pose.rise_mm * self._breath
         if pose.jaw > 0 and self._swings:
             turn, shift = _path_of(pose, self._jaw)
             full_turn, full_shift = self._whole

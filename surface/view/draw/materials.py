@@ -43,6 +43,8 @@ _LOWER_LASHES = 0.42
 _GROOVE_MM, _GROOVE = 2.2, 0.5
 #: Radius of an iris, in eyeball radii, and of its pupil, in radii of the iris.
 _IRIS, _PUPIL = 0.49, 0.185 / 0.49
+#: In radii of the iris: a rim of it is always left.
+_WIDEST_PUPIL = 0.75
 #: How a bar of lamps fades, as brows do in hair.frag.
 _BAR = (2.2, -2.6, 0.08, 0.0)
 #: How far from its roots hair counts that does not hang from a parting, mm.
@@ -237,7 +239,7 @@ def _eye_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[s
         "sclera_colour": tuple(colours.get("sclera", theme.sclera)),
         "glow": theme.glow,
         "iris_radius": radius,
-        "pupil_radius": _PUPIL * theme.pupil * radius,
+        "pupil_radius": min(_PUPIL * theme.pupil * (1.0 + openings.pupil), _WIDEST_PUPIL) * radius,
         **openings.eye(part),
         **_rectangle(colours),
     }

@@ -155,6 +155,10 @@ class Renderer:
     def update(self) -> int:
         """Bring the buffers up to date with the last :meth:`pose`, once after each. Returns vertices changed."""
         self.openings.refresh()
+        pupil = float(getattr(self.head, "pupil", 0.0))
+        if pupil != self.openings.pupil:
+            self.openings.pupil = pupil
+            self.revision += 1
         if self.resend and type(self.evaluator) is Evaluator:
             whole = [buffers for buffers in self._parts if isinstance(buffers, PartBuffers)]
             sent = sum(buffers.upload([(0, len(buffers.part.vertices))]) for buffers in whole)

@@ -86,6 +86,10 @@ class Openings:
     parts : the head's parts, at rest.
     read : gives the positions (k, 3) of vertices (k,) of a part as posed now.
     contacts : of the head, which say which part is the face.
+
+    Attributes
+    ----------
+    pupil : share by which pupils are now wider than the theme's light makes them.
     """
 
     def __init__(
@@ -93,6 +97,7 @@ class Openings:
         contacts: Sequence[Contact] = (),
     ) -> None:  # fmt: skip
         self._read = read
+        self.pupil = 0.0
         self._skin, loops = _face_with_loops(parts, contacts)
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)

@@ -42,6 +42,19 @@ def test_reads_what_was_published() -> None:
         assert out.tolist() == [4.0, 5.0, 6.0]
 
 
+def test_breath_and_pupils_come_with_the_vector() -> None:
+    with Mailbox.create(3) as box:
+        out = np.zeros(3)
+        box.read(out)
+        assert box.life == (0.0, 0.0)
+        box.publish(np.array([1.0, 2.0, 3.0]), 42, (2.5, -0.125))
+        assert box.life == (0.0, 0.0)  # that of what was read
+        assert box.read(out) == (1, 42) and out.tolist() == [1.0, 2.0, 3.0] and box.life == (2.5, -0.125)
+        box.publish(out, 43)
+        box.read(out)
+        assert box.life == (0.0, 0.0)
+
+
 def test_another_process_gets_the_same_memory_which_has_no_name() -> None:
     before = set(os.listdir(mailboxes.MEMORY))
     ours, theirs = multiprocessing.Pipe()
@@ -115,7 +128,7 @@ def test_a_file_that_takes_only_some_of_the_bytes_is_full(monkeypatch: pytest.Mo
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     resource.setrlimit(resource.RLIMIT_FSIZE, (4096, before[1]))
     try:
-        with pytest.raises(ControllerError, match="no room for 9648 bytes"):
+        with pytest.raises(ControllerError, match="no room for 9680 bytes"):
             Mailbox.create(601)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)

@@ -533,3 +533,15 @@ def test_an_error_in_a_request_of_the_panel_ends_nothing(
             assert ours.poll(5.0) and ours.recv() == messages.Details()
         ours.send(messages.Stop())
         assert _handle(body, theirs) is False
+
+
+def test_a_lively_face_breathes_and_another_does_not(tmp_path: Path) -> None:
+    for liveliness, breathes in ((1.0, True), (0.0, False)):
+        stage, seen, values = stage_of(tmp_path, f"liveliness = {liveliness}\n"), set(), P.neutral()
+        with Mailbox.create(len(P)) as mailbox:
+            body = Body(stage, P, mailbox)
+            for k in range(300):
+                body.tick(10**9 + k * 10**7, 0.01)
+                mailbox.read(values)
+                seen.add(mailbox.life)
+        assert (max(rise for rise, _ in seen) > 2.5) == breathes and (len(seen) > 100) == breathes

@@ -229,3 +229,31 @@ def test_a_picture_that_took_too_long_is_followed_by_the_next_at_once(
     finally:
         face.close()
     assert began == [0, 100_000_000, 350_000_000, 450_000_000]
+
+
+def test_breath_and_pupils_of_the_mailbox_are_those_of_the_values() -> None:
+    with Mailbox.create(len(PARAMETERS.names)) as mailbox:
+        values = HeadValues(mailbox, PARAMETERS, ("jawOpen",))
+        mailbox.publish(PARAMETERS.neutral(), 7, (1.5, 0.1))
+        assert values.life == (0.0, 0.0)
+        values()
+        assert values.life == (1.5, 0.1)
+
+
+def test_a_face_without_a_display_breathes_as_its_values_say(tmp_path: Path) -> None:
+    save_data(tmp_path, small_head())
+    head, rounds, seen = Head.load(tmp_path), iter([True, True, False]), list[tuple[float, float]]()
+    with Mailbox.create(len(PARAMETERS.names)) as mailbox:
+
+        def keep_going() -> bool:
+            seen.append((head.rise_mm, head.pupil))
+            mailbox.publish(PARAMETERS.neutral(), 0, (1.0 + len(seen), 0.05))
+            return next(rounds)
+
+        values = HeadValues(mailbox, PARAMETERS, head.parameters)
+        face = HeadlessFace(head, FaceSettings(size=(32, 32), fps=60, evaluator="cpu"), values)
+        try:
+            face.run(keep_going)
+        finally:
+            face.close()
+    assert seen == [(0.0, 0.0), (2.0, 0.05), (3.0, 0.05)]

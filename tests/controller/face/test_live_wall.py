@@ -59,6 +59,12 @@ def test_heads_appear_one_look_after_the_other_and_each_shows_its_own_face(
         np.testing.assert_array_equal(again, first)
         np.testing.assert_array_equal(same, oak)
         assert (opened != first).mean() > 0.01
+        boxes[2].publish(face, 0, (6.0, 0.0))
+        boxes[1].publish(P.neutral(), 0, (6.0, 0.0))
+        again, same, breathing = tiles()
+        np.testing.assert_array_equal(again, first)
+        assert (breathing[60:] != opened[60:]).any() and (same[60:] != oak[60:]).any()
+        np.testing.assert_array_equal(breathing[:40], opened[:40])
         assert [tile.shape for tile in tiles((100, 300))] == [(100, 100, 3)] * 3
         wall.release()
         wall.release()  # nothing is released twice

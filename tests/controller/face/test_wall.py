@@ -79,3 +79,25 @@ def test_without_a_recorder_heads_are_drawn_and_nothing_is_kept(tmp_path: Path, 
             asked = iter([True, True, False])
             face.run(lambda: next(asked))
             assert face.report()["frames"] == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("heads", [("", ""), ("", 'person = "oak"')])
+def test_each_head_of_a_wall_breathes_by_itself(tmp_path: Path, heads: tuple[str, str]) -> None:
+    stage, seen = stage_of(tmp_path, *heads), []
+    with ExitStack() as stack:
+        boxes = [stack.enter_context(Mailbox.create(len(P))) for _ in heads]
+        recorder = Recorder(whole=True, clip_hz=1e6)
+        with closing(WallFace(stage, P, boxes, recorder)) as face:
+            asked = iter([True, True, True, False])
+
+            def keep_going() -> bool:
+                rise_mm = 6.0 if seen else 0.0
+                boxes[1].publish(P.neutral(), 0, (rise_mm, 0.2 if seen else 0.0))
+                seen.append(rise_mm)
+                return next(asked)
+
+            face.run(keep_going)
+    first, *_, last = (frame.astype(int) for frame in recorder.frames)
+    changed = np.abs(last - first).max(axis=2) > 3
+    assert not changed[:, :96].any() and changed[60:, 96:].any()

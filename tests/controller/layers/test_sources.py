@@ -86,3 +86,19 @@ def test_values_that_are_no_numbers_are_refused() -> None:
     for bad in (np.nan, np.inf):
         with pytest.raises(ParameterError, match="finite"):
             require_finite(np.array([0.0, bad]))
+
+
+def test_breath_and_pupils_go_with_life_and_do_not_jump() -> None:
+    rig = Rig()
+    rig.run(1.0)
+    assert rig.sources.beside.now == (0.0, 0.0)
+    rig.sources.life.liveliness, path = 1.0, []
+    for k in range(500):
+        rig.run(0.02)
+        path.append(rig.sources.beside.now)
+        if k == 300:
+            assert rig.sources.beside.now == rig.sources.life.beside
+        if k == 320:
+            rig.sources.life.liveliness = 0.0
+    assert path[-1] == (0.0, 0.0) and max(rise for rise, _ in path) > 2.9 and max(abs(p) for _, p in path) > 0.02
+    assert (np.abs(np.diff(path, axis=0)).max(axis=0) < [0.2401, 0.01201]).all()

@@ -176,3 +176,19 @@ def test_captures_are_recorded(tmp_path: Path) -> None:
     *_, (_, values) = replay(path, P)
     np.testing.assert_array_equal(values, out)
     assert values[P.index("jawOpen")] == pytest.approx(0.6, abs=0.01)
+
+
+def test_breath_and_pupils_of_a_recording_are_those_of_its_run(tmp_path: Path) -> None:
+    path, now, shown = tmp_path / "run.omote", 10**9, []
+    with recorded(CommandState(P, seed=7), path, seed=7) as state:
+        state.live(1.0, now)
+        for _ in range(200):
+            now += STEP_NS
+            state.tick(now, 0.01, P.neutral())
+            shown.append(state.beside)
+    player, played, out = Replay(path, P), [], P.neutral()
+    assert player.beside == (0.0, 0.0)
+    for k in range(200):
+        player.tick(k * STEP_NS, 0.01, out)
+        played.append(player.beside)
+    assert played == shown and np.ptp(shown, axis=0).min() > 0.02

@@ -197,6 +197,26 @@ def test_no_seam_opens_in_random_mixtures(head):
         assert seams_gape(head) < 0.1
 
 
+def test_no_seam_opens_with_a_breath_and_the_face_keeps_still(head):
+    head.pose(head.values({}))
+    rest = {part.name: part.vertices.copy() for part in head.parts}
+    try:
+        for rise_mm in (1.0, 3.0, 5.0):
+            head.live(rise_mm, 0.0)
+            head.pose(head.values({}))
+            assert seams_gape(head) < 0.021  # they overlap by a fiftieth
+            moved = {p.name: np.linalg.norm(p.vertices - rest[p.name], axis=1) for p in head.parts}
+            assert 0.8 * rise_mm < moved["face"].max() < 1.6 * rise_mm and moved["back"].max() > 0.8 * rise_mm
+            assert moved["face"][rest["face"][:, 1] > -60.0].max() < 0.02 * rise_mm  # the jaw
+            assert moved["face"][rest["face"][:, 1] > -20.0].max() < 1e-3  # some control points reach far
+            assert not any(by.any() for name, by in moved.items() if name not in ("face", "back"))
+    finally:
+        head.live(0.0, 0.0)
+    head.pose(head.values({}))
+    for part in head.parts:  # but for the rounding of sums of differences
+        np.testing.assert_allclose(part.vertices, rest[part.name], atol=2e-5)
+
+
 OPENING = ({}, {"jawOpen": 1}, {"mouthFunnel": 1}, {"tongueOut": 1}, {"eyeWideLeft": 1, "leftEyeYaw": 0.86},
            {"jawOpen": 0.7, "mouthLeft": 1}, {"mouthUpperUpLeft": 1, "mouthLowerDownRight": 1})  # fmt: skip
 

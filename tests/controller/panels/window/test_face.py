@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,14 +18,18 @@ from controller.base.parameters import PARAMETERS
 from controller.base.paths import find_config
 from controller.body.messages import Hold, Neutral, Show
 from controller.body.panel_state import PanelState
+from controller.face.face import HeadValues
 from controller.layers.commands import CommandState
 from controller.panels.window.panel import Panel, PanelOptions
 from controller.robot.channels import build_table
 from controller.robot.following import FollowingStatistics, MeasuredFace
 from controller.robot.robot import load_robot
+from controller.stage.stage import FaceSettings
 from controller.vocabulary.vocabulary import Vocabulary
 from drivers.base.bus import BusState
+from surface.head import Head
 from tests.controller.panels.window.screen import Places, Screen, drawn
+from tests.surface.small_head import small_head
 
 on_a_display = pytest.mark.skipif(
     shutil.which("xvfb-run") is None, reason="needs xvfb-run (apt-get install xvfb): a display to open a window on"
@@ -236,3 +241,21 @@ def test_the_panel_shows_who_holds_a_parameter_and_how_far_the_servos_are(
         screen.click(draw, *places.at["jaw   1 held   servos 3.0 deg away###jaw"])
         screen.frame(draw)
     assert places.formats["##jawOpen"] == "%.2f  manual"
+
+
+def test_the_face_in_a_window_breathes_as_its_values_say(monkeypatch: pytest.MonkeyPatch) -> None:
+    from controller.panels.window import face as module
+
+    head, seen = Head(small_head()), []
+
+    def run_window(shown: Head, source: Callable[[], np.ndarray], **_: object) -> None:
+        for rise_mm in (0.0, 2.0):
+            mailbox.publish(PARAMETERS.neutral(), 0, (rise_mm, rise_mm / 20))
+            source()
+            seen.append((shown.rise_mm, shown.pupil))
+
+    monkeypatch.setattr(module, "run_window", run_window)
+    with Mailbox.create(len(PARAMETERS)) as mailbox:
+        values = HeadValues(mailbox, PARAMETERS, head.parameters)
+        module.WindowFace(head, FaceSettings(kiosk=True), values, lambda request: None).run(lambda: True)
+    assert seen == [(0.0, 0.0), (2.0, 0.1)]

@@ -9,6 +9,7 @@ import pytest
 from small_head import small_head
 
 from surface.head import Head
+from surface.head.model.data import Neck
 from surface.head.posing.crowd import Crowd
 
 ROOT = Path(__file__).parents[4]
@@ -122,3 +123,18 @@ def test_a_head_that_is_shown_says_how_it_is_turned() -> None:
         crowd.show(k)
         for part in crowd.head.parts:
             np.testing.assert_allclose(part.turn, wanted, atol=1e-12)
+
+
+def test_each_head_of_a_crowd_has_its_own_breath_and_pupils() -> None:
+    neck = Neck((0.0, 30.0, 0.0), 0.0, 0.0, 15.0)
+    crowd, alone = Crowd(Head(small_head(neck=neck)), 3), Head(small_head(neck=neck))
+    still, lives = np.zeros((3, len(alone.parameters))), np.array([[0.0, 0.0], [2.0, 0.1], [0.5, -0.1]])
+    assert crowd.pose(still, lives) == [1, 2] and crowd.pose(still, lives) == []
+    for k, life in enumerate(lives.tolist()):
+        alone.live(*life)
+        alone.pose(still[0])
+        crowd.show(k)
+        assert crowd.head.pupil == life[1]
+        for own, part in zip(crowd.parts, alone.parts, strict=True):
+            np.testing.assert_allclose(own.vertices[k], part.vertices, atol=2e-4)
+    assert crowd.pose(still) == [1, 2]  # back at rest

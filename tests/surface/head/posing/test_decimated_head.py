@@ -11,7 +11,7 @@ from small_head import all_points, small_head
 from small_head import part as patch
 
 from surface.head import Head
-from surface.head.model.data import Seam
+from surface.head.model.data import Neck, Seam
 from surface.head.posing.decimated_head import DecimatedHead, submesh
 
 VALUES = ({}, {"mouthPucker": 0.7, "headYaw": 0.3}, {"jawOpen": 0.4, "headYaw": 0.3}, {"jawOpen": 0.4})
@@ -123,3 +123,18 @@ def test_some_vertices_of_a_mesh_keep_their_places_and_the_points_that_reach_the
         assert np.array_equal(own, mesh.points_of(int(mesh.cell[original])))
         first, last = some.cell_start[some.cell[vertex] :][:2]
         assert first <= vertex < last
+
+
+def test_it_breathes_as_the_head_does() -> None:
+    made = Head(small_head(neck=Neck((0.0, 30.0, 0.0), 0.0, 0.0, 15.0)))
+    for part in made.parts:
+        part.decimated = {"fast": part.triangles[::3]}
+    decimated, zeros = DecimatedHead(made, made.parts, "fast", {}), np.zeros(len(made.parameters))
+    before = decimated.vertices.copy()
+    made.live(2.5, 0.0)
+    decimated.pose(zeros)
+    made.pose(zeros)
+    assert_alike(decimated)
+    assert np.abs(decimated.vertices - before).max() > 1.5
+    decimated.pose(zeros)
+    assert not any(part.changed for part in decimated.parts if not part.part.name.startswith("tooth"))

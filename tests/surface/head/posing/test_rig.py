@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from small_head import JAW, all_points, part, small_head
 
-from surface.head.model.data import Contact, Seam
+from surface.head.model.data import Contact, Neck, Seam
 from surface.head.model.meshes import make_surface
 from surface.head.model.parameters import NAMES, read_pose
+from surface.head.model.sway import breath_moves
 from surface.head.posing import rig as rig_module
 from surface.head.posing.rig import LID_MM, SkinRig, jaw_path, rigid_motion
 
@@ -219,3 +220,25 @@ def test_a_tongue_rests_on_lips_of_another_part(monkeypatch, lips, name, group, 
         monkeypatch.setattr(rig_module, "_clearances", lambda *_: [])
         SkinRig(p, head)
         assert asked == ([name] if wanted and counts else [])
+
+
+CHEST = Neck((0.0, 30.0, 0.0), 0.0, 0.0, 15.0)  # a patch of which the lower half is a chest
+
+
+def test_a_breath_moves_the_chest_and_nothing_above_it():
+    p = part("a", 0)
+    rig = SkinRig(p, small_head(neck=CHEST))
+    breath = replace(pose(), rise_mm=2.0)
+    by = rig.apply(breath) - p.points
+    np.testing.assert_allclose(by, 2.0 * breath_moves(p.points, CHEST))
+    low = p.points[:, 1] <= 0.0
+    assert (by[low, 1] > 0.9).all() and not by[p.points[:, 1] >= 15.0].any()
+    assert np.array_equal(rig.apply(pose()), p.points)
+
+
+def test_only_what_breathes_is_computed_again_and_only_if_it_does():
+    chest, face = SkinRig(part("a", 0), small_head(neck=CHEST)), SkinRig(part("a", 0), HEAD)
+    for rise_mm, versions in ((0.0, (1, 1)), (1.0, (2, 1)), (1.0, (2, 1)), (0.5, (3, 1))):
+        for rig in (chest, face):
+            rig.apply(replace(pose(mouthPucker=0.0), rise_mm=rise_mm))
+        assert (chest.version, face.version) == versions

@@ -408,3 +408,33 @@ def test_the_surface_of_dark_skin_mirrors_what_is_above(gl: None, quality: str, 
             shown.append([middle(picture, 0.5, at).sum() for at in (0.3, 0.8)])
     forehead, chin = np.subtract(shown[1], shown[0])
     assert (forehead > chin + 20.0) == mirrored and (mirrored or forehead == chin == 0.0), (forehead, chin)
+
+
+@pytest.mark.parametrize("theme", sorted(THEMES))
+@pytest.mark.parametrize("quality", ["full", "fast"])
+def test_pupils_widen_in_both_eyes_alike_and_nothing_else_does(gl: None, quality: str, theme: str) -> None:
+    head = BallHead()
+    with Offscreen(head, SIZE, quality=quality, theme=theme) as screen:
+        rest = screen.render(values()).astype(int)
+        seen = []
+        for pupil in (0.2, -0.2):
+            head.pupil = pupil
+            revision = screen.renderer.revision
+            changed = np.abs(screen.render(values()).astype(int) - rest).max(axis=2) > 2
+            assert screen.renderer.revision > revision
+            seen.append(screen.renderer._programs["eye"]["pupil_radius"].value)
+            left, right = changed[:, : SIZE[0] // 2].sum(), changed[:, SIZE[0] // 2 :].sum()
+            assert left > 0 and right > 0 and abs(int(left) - int(right)) <= 0.5 * max(left, right)
+            assert changed.sum() < 0.01 * changed.size
+        assert seen[0] / seen[1] == pytest.approx(1.5)
+        head.pupil = 0.0
+        np.testing.assert_array_equal(screen.render(values()), rest)
+
+
+def test_a_pupil_always_leaves_a_rim_of_the_iris(gl: None) -> None:
+    head = BallHead()
+    with Offscreen(head, SIZE, theme=replace(find_theme("skin"), key=Light(0.0, 0.0, (0.0, 0.0, 0.0)))) as screen:
+        head.pupil = 9.0
+        screen.render(values())
+        program = screen.renderer._programs["eye"]
+        assert program["pupil_radius"].value == pytest.approx(0.75 * program["iris_radius"].value)
