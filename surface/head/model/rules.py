@@ -12,8 +12,8 @@ from surface.head.model.parameters import SHAPES, SIDES
 
 ROUNDS = {"mouthPucker": 1.2, "mouthFunnel": 0.7, "tongueOut": -2.0}
 """Shares of shapes in how round an open mouth is: the orbicularis draws the lips together at its corners."""
-_JAW, _TORN = SHAPES.index("jawOpen"), (0.3, 0.8)
-"""Amounts of jawOpen between which rounded lips are drawn apart again."""
+_JAW, _CLOSE, _TORN = SHAPES.index("jawOpen"), SHAPES.index("mouthClose"), (0.3, 0.8)
+"""Amounts of jawOpen, less mouthClose, between which rounded lips are drawn apart again."""
 
 
 class Drivers:
@@ -103,7 +103,7 @@ class SealDriver:
         puckered = sum(share * shapes[k] for k, share in self._rounds)
         if puckered <= 0.0:
             return 0.0
-        t = min(max((shapes[_JAW] - _TORN[0]) / (_TORN[1] - _TORN[0]), 0.0), 1.0)
+        t = min(max((shapes[_JAW] - shapes[_CLOSE] - _TORN[0]) / (_TORN[1] - _TORN[0]), 0.0), 1.0)
         return float(min(puckered, 1.0) * (1.0 - t * t * (3.0 - 2.0 * t)))
 
     def _at(self, shapes: Floats, own: float, seal: Seal) -> float:

@@ -68,5 +68,6 @@ def test_lips_are_rounded_by_a_pucker_that_keeps_them_together() -> None:
     assert driver.rounding(shapes(mouthPucker=1.0, jawOpen=0.3)) == 1.0
     assert driver.rounding(shapes(mouthPucker=1.0, jawOpen=0.55)) == pytest.approx(0.5)
     assert driver.rounding(shapes(mouthPucker=1.0, jawOpen=0.9)) == 0.0
+    assert driver.rounding(shapes(mouthPucker=1.0, jawOpen=0.9, mouthClose=0.6)) == 1.0
     drawn = SealDriver(Seal({"jawOpen": 3.6, "mouthPucker": 1.4}, 0.45, 1.0))  # a round open mouth by itself
     assert drawn.rounding(shapes(mouthPucker=1.0)) == SealDriver(None).rounding(shapes(mouthPucker=1.0)) == 0.0
