@@ -31,8 +31,14 @@ ROOT_MM = 0.4  # height above the skin of the lashes' roots: its triangles may b
 LASH_ROOT = (0.0145, 0.0188)  # how far outside the hole in the skin lower and upper lashes begin, in v
 LASH_MM, LOWER_LASH_MM = 8.0, 3.0
 STRIP_BUDGET = {"brow": (0, 0.4, 6), "lash": (0, 0.6, 6)}  # fine enough for single hairs
-LASHES, LOWER_LASHES = (21, 19), (20,)  # in each strip: those of one lid lie over each other, for a cell cuts few hairs cleanly
-LASH_LINES = {True: (0.035, 0.95, 27), False: (0.10, 0.94, 22)}  # where upper and lower lashes grow along a lid, samples
+LASHES, LOWER_LASHES = (
+    (21, 19),
+    (20,),
+)  # in each strip: those of one lid lie over each other, for a cell cuts few hairs cleanly
+LASH_LINES = {
+    True: (0.035, 0.95, 27),
+    False: (0.10, 0.94, 22),
+}  # where upper and lower lashes grow along a lid, samples
 INNER_LASH = 0.24, 0.55  # length of the innermost lash, of the longest; its width, of a lash's beyond the middle
 BESIDE = 0.15  # in radii of an eyeball: so near to their own surface half the control points that keep to it have to be
 BENT = 0.04  # in radii: more than this a strip that keeps to an eyeball may not lie beside a shape that was fitted
@@ -104,7 +110,12 @@ def lash_strip(skin: Skin, root: Floats, eye: Floats, length: Floats, *, upper: 
         at + reach * (0.55 * LASH_LEAN * away + 0.12 * LASH_LIFT * up),
         at + reach * (LASH_LEAN * away + LASH_LIFT * up),
     ]
-    return fit_strip(np.stack(rows, axis=2), 10, 3, [comb(hairs, lean=0.012, thick=0.19 if upper else 0.2, inner=INNER_LASH[1], seed=hairs)])
+    return fit_strip(
+        np.stack(rows, axis=2),
+        10,
+        3,
+        [comb(hairs, lean=0.012, thick=0.19 if upper else 0.2, inner=INNER_LASH[1], seed=hairs)],
+    )
 
 
 def lash_counts(*, upper: bool) -> tuple[int, ...]:

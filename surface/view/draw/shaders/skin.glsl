@@ -71,11 +71,11 @@ vec3 folded(float over, float deep) {
     float crease = bell(over * 2.2) + 0.5 * bell((over + 0.4) * 0.85);
     float under = over < 0.0 ? bell(over * 0.40) : bell(over * 1.6);
     float above = bell((over - 2.4) * 0.55);
-    return exp2(-deep * (crease * vec3(0.62, 0.98, 1.04) + under * vec3(0.16, 0.23, 0.24) - above * 0.16));
+    return exp2(-deep * (crease * vec3(0.78, 1.06, 1.08) + deep * under * vec3(0.19, 0.25, 0.26) - above * 0.16));
 }
 
 // The same where only vertices know of it, some of which lie beside the crease.
 vec3 folded_softly(float over, float deep) {
-    return exp2(-deep * (bell((over + 0.2) * 0.65) * vec3(0.62, 0.92, 0.98) - 0.14 * bell((over - 2.6) * 0.55)));
+    return exp2(-deep * (bell((over + 0.2) * 0.62) * vec3(0.80, 1.10, 1.14) - 0.14 * bell((over - 2.6) * 0.55)));
 }
 #endif
