@@ -24,7 +24,7 @@ from surface.head.model.data import Jaw, PartData
 from surface.head.posing.contact import LID_MM
 
 DEGREES = (3, 2)
-END_LASH = 0.03  # distance of the first and the last lash from the strip's ends
+END_LASH = 0.045  # distance of the first and the last lash from the strip's ends
 TIP = 0.0022  # half the width of a lash's tip, in the strip's length: a finer one would be cut into pieces
 LASH_LEAN, LASH_LIFT = 0.85, 0.46  # of a lash's length: away from the eyeball, up along it
 ROOT_MM = 0.4  # height above the skin of the lashes' roots: its triangles may be up to a quarter higher
@@ -36,7 +36,7 @@ LASHES, LOWER_LASHES = (
     (20,),
 )  # in each strip: those of one lid lie over each other, for a cell cuts few hairs cleanly
 LASH_LINES = {
-    True: (0.035, 0.95, 27),
+    True: (0.02, 0.95, 27),
     False: (0.10, 0.94, 22),
 }  # where upper and lower lashes grow along a lid, samples
 INNER_LASH = 0.24, 0.55  # length of the innermost lash, of the longest; its width, of a lash's beyond the middle
@@ -133,7 +133,7 @@ def lash_length(along: Floats) -> Floats:
 def comb(hairs: int, *, lean: float, thick: float, inner: float = 1.0, seed: int = 5) -> Floats:
     """One closed line: a thin continuous root, and hairs that taper to :data:`TIP`; ``thick`` in their distances, by
     ``inner`` of it at the line's beginning."""
-    rng, root = np.random.default_rng(seed), min(0.22 * thick, 0.06)
+    rng, root = np.random.default_rng(seed), 0.22 * thick
     tops = []
     for k in range(hairs):
         s = END_LASH + (1.0 - 2.0 * END_LASH) * (k + 0.5) / hairs  # the outermost lean outwards and must not be cut off

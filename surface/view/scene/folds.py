@@ -69,7 +69,7 @@ def fold_over(vertices: np.ndarray, upper: np.ndarray, lower: np.ndarray, painte
     deep = painted[:, 0] * _smooth(along, *_BEGINS) * (1.0 - _smooth(along, *_FADES))
     deep[at[:, 2] < rim[top, 2] - _BEHIND * width] = 0.0
     middle = np.abs(along - 0.5) < 0.12
-    crease = np.where(middle & (deep > 0.0), np.abs(across), np.inf)
+    crease = np.where(middle & (deep > 0.0), np.hypot(across, 0.5 * width * (along - 0.5)), np.inf)
     if not np.isfinite(crease).any():
         return None
     centre = [ids[np.argmin(np.abs(along[ids] - 0.5))] for ids in (upper, lower)]

@@ -116,7 +116,7 @@ class Openings:
         return found
 
     def _find_folds(self) -> tuple[Fold | None, Fold | None]:
-        """The folds over the eyes to the left, at x above 0, and to the right; none where the skin is painted without."""
+        """The folds over the left eye, at x above 0, and the right one; none where the skin is painted without."""
         found: list[Fold | None] = [None, None]
         painted = None if self._skin is None else self._skin.attributes.get("fold")
         if self._skin is None or painted is None or not painted[:, 0].any():
