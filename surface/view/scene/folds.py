@@ -19,7 +19,7 @@ _BEGINS, _FADES = (0.0, 0.38), (0.68, 1.22)
 #: How far behind the middle of the lid's rim, in widths of the eye, skin may lie that has a fold.
 _BEHIND = 0.75
 #: Share of the opening at rest at which the crease is whole; what is left of it when the eye is shut.
-_OPEN, _SHUT = (0.10, 0.85), 0.42
+_OPEN, _SHUT = (0.15, 1.0), 0.42
 #: Height of the platform, as a share of that at rest, at which the brow hides the crease and where it is whole.
 _HIDDEN = 0.45, 0.85
 
