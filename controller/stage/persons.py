@@ -38,9 +38,10 @@ class SkinSettings(Settings):
 
 
 class EyeSettings(Settings):
-    """Appearance of the eyes."""
+    """Appearance of the eyes; ``fold`` : of the upper lids, how deep and how high, 1 as the head has it."""
 
     iris: HexColour | None = None
+    fold: tuple[Depth, Depth] = (1.0, 1.0)
 
 
 class BrowSettings(Settings):
@@ -92,6 +93,7 @@ class PersonSettings(Settings):
             iris=linear(self.eyes.iris),
             brow=linear(self.brows.colour),
             brow_strength=self.brows.strength,
+            fold=self.eyes.fold,
             worn=tuple(worn),
         )
 

@@ -25,13 +25,21 @@ from surface.head.posing.contact import LID_MM
 
 DEGREES = (3, 2)
 END_LASH = 0.045  # distance of the first and the last lash from the strip's ends
-TIP = 0.003  # half the width of a lash's tip, in the strip's length: a finer one would be cut into pieces
-LASH_LEAN, LASH_LIFT = 0.85, 0.5  # of a lash's length: away from the eyeball, up along it
+TIP = 0.0022  # half the width of a lash's tip, in the strip's length: a finer one would be cut into pieces
+LASH_LEAN, LASH_LIFT = 0.85, 0.46  # of a lash's length: away from the eyeball, up along it
 ROOT_MM = 0.4  # height above the skin of the lashes' roots: its triangles may be up to a quarter higher
 LASH_ROOT = (0.0145, 0.0188)  # how far outside the hole in the skin lower and upper lashes begin, in v
-LASH_MM, LOWER_LASH_MM = 8.0, 3.2
-STRIP_BUDGET = {"brow": (0, 0.4, 6), "lash": (0, 0.2, 7)}  # fine enough for single hairs
-LASHES, LOWER_LASHES = 24, 14
+LASH_MM, LOWER_LASH_MM = 8.0, 3.0
+STRIP_BUDGET = {"brow": (0, 0.4, 6), "lash": (0, 0.6, 6)}  # fine enough for single hairs
+LASHES, LOWER_LASHES = (
+    (21, 19),
+    (20,),
+)  # in each strip: those of one lid lie over each other, for a cell cuts few hairs cleanly
+LASH_LINES = {
+    True: (0.02, 0.95, 27),
+    False: (0.10, 0.94, 22),
+}  # where upper and lower lashes grow along a lid, samples
+INNER_LASH = 0.24, 0.55  # length of the innermost lash, of the longest; its width, of a lash's beyond the middle
 BESIDE = 0.15  # in radii of an eyeball: so near to their own surface half the control points that keep to it have to be
 BENT = 0.04  # in radii: more than this a strip that keeps to an eyeball may not lie beside a shape that was fitted
 BROW_MM = (4.2, 4.6)  # how far a brow reaches below and above its line
@@ -102,16 +110,34 @@ def lash_strip(skin: Skin, root: Floats, eye: Floats, length: Floats, *, upper: 
         at + reach * (0.55 * LASH_LEAN * away + 0.12 * LASH_LIFT * up),
         at + reach * (LASH_LEAN * away + LASH_LIFT * up),
     ]
-    return fit_strip(np.stack(rows, axis=2), 10, 3, [comb(hairs, lean=0.012, thick=0.42 if upper else 0.36)])
+    return fit_strip(
+        np.stack(rows, axis=2),
+        10,
+        3,
+        [comb(hairs, lean=0.012, thick=0.19 if upper else 0.2, inner=INNER_LASH[1], seed=hairs)],
+    )
 
 
-def comb(hairs: int, *, lean: float, thick: float) -> Floats:
-    """One closed line: a thin continuous root, and hairs that taper to :data:`TIP`; ``thick`` in their distances."""
-    rng, root = np.random.default_rng(5), 0.22 * thick
+def lash_counts(*, upper: bool) -> tuple[int, ...]:
+    """Hairs in each strip of one lid's lashes."""
+    return LASHES if upper else LOWER_LASHES
+
+
+def lash_length(along: Floats) -> Floats:
+    """(m,) length of lashes along a lid (m,), 0 at the inner corner, of the longest, which grow beyond the middle."""
+    inner = INNER_LASH[0]
+    length: Floats = inner + (1.0 - inner) * np.sin(np.pi * np.clip(0.02 + 0.64 * along, 0.0, 1.0))
+    return length
+
+
+def comb(hairs: int, *, lean: float, thick: float, inner: float = 1.0, seed: int = 5) -> Floats:
+    """One closed line: a thin continuous root, and hairs that taper to :data:`TIP`; ``thick`` in their distances, by
+    ``inner`` of it at the line's beginning."""
+    rng, root = np.random.default_rng(seed), 0.22 * thick
     tops = []
     for k in range(hairs):
         s = END_LASH + (1.0 - 2.0 * END_LASH) * (k + 0.5) / hairs  # the outermost lean outwards and must not be cut off
-        half = thick / hairs
+        half = thick / hairs * min(1.0, inner + 2.0 * (1.0 - inner) * s)
         tip = 1.0 - 0.35 * rng.random()
         shift = lean * (2 * s - 1) * 4 + 0.6 * (rng.random() - 0.5) / hairs
         tops += [(s - half, root), (s + shift - TIP, tip), (s + shift + TIP, tip), (s + half, root)]
@@ -232,10 +258,8 @@ def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], rig
         rim = chart.loops[chart.hole_near(mesh.vertices, eye)]
         for upper in (True, False):
             root, along = _lid_line(rim, upper=upper, inner_first=is_left)
-            length = (LASH_MM if upper else LOWER_LASH_MM) * (  # longest beyond the middle, short at the inner corner
-                0.45 + 0.55 * np.sin(np.pi * np.clip(0.12 + 0.62 * along, 0, 1))
-            )
-            lashes.append(lash_strip(skin, root, eye, length, upper=upper, hairs=LASHES if upper else LOWER_LASHES))
+            length = (LASH_MM if upper else LOWER_LASH_MM) * lash_length(along)
+            lashes += [lash_strip(skin, root, eye, length, upper=upper, hairs=n) for n in lash_counts(upper=upper)]
     return [strips_part(n, m, s, rig) for n, m, s in (("brows", "brow", brows), ("lashes", "lash", lashes))]
 
 
@@ -252,7 +276,7 @@ def _brow_patch(chart: Chart, mesh: FitMesh, ids: Ints) -> Floats:
 def _lid_line(rim: Floats, *, upper: bool, inner_first: bool) -> tuple[Floats, Floats]:
     """(m, 2) the lashes' roots, just outside a lid's rim, inner corner first; (m,) 0..1 along the lid."""
     u0, u1 = rim[:, 0].min(), rim[:, 0].max()
-    along = np.linspace(0.10, 0.95, 24) if upper else np.linspace(0.22, 0.94, 20)
+    along = np.linspace(*LASH_LINES[upper][:2], LASH_LINES[upper][2])
     u = u0 + (u1 - u0) * (along if inner_first else 1.0 - along)
     middle = 0.5 * (rim[:, 1].min() + rim[:, 1].max())
     half = rim[(rim[:, 1] > middle) == upper]

@@ -57,6 +57,7 @@ class Look:
     age : 0 young to 1 with deep wrinkles at rest.
     forehead : how deep raised brows fold each line of the forehead, the lowest first; 1 as the head has it.
     lips : colour of lips. iris, brow : colours. brow_strength : how dense brows are, 1 as they are.
+    fold : how deep the folds of the upper lids are, and how high over their rims, 1 as the head has them.
     worn : what is put on the head.
     """
 
@@ -70,6 +71,7 @@ class Look:
     iris: Colour | None = None
     brow: Colour | None = None
     brow_strength: float = 1.0
+    fold: tuple[float, float] = (1.0, 1.0)
     worn: tuple[Worn, ...] = ()
 
 

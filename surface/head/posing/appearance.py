@@ -57,6 +57,8 @@ def apply_look(parts: Iterable[HeadPart], look: Look, eyes: Floats) -> None:
             _colour_skin(part, look)
             _spread_gloss(part, eyes, MATT * (look.melanin or 0.0) ** 2)
             _mottle(part, look, eyes)
+            if "fold" in part.attributes:
+                part.attributes["fold"] = part.attributes["fold"] * np.array(look.fold, np.float32)
             if look.freckles > 0.0:
                 part.attributes["freckles"] = look.freckles * _freckle_density(part, eyes)
         elif part.material == "eye" and look.iris is not None:

@@ -28,6 +28,7 @@ BASE: dict[str, tuple[float, ...]] = {
     "occlusion_floor": (0.0,),  # baked shade leaves at least this much light
     "gloss": (0.3,),
     "lips": (0.0,),  # 1 on lips, 0.5 at their edge, which quality "full" draws by pixel
+    "fold": (0.0, 0.0),  # of the upper lids: how deep, and the platform's height, mm; all over the face
     "iris": (0.080, 0.125, 0.150),  # colours of an eyeball, and the iris's radius in eyeball radii: all over it
     "sclera": (0.68, 0.63, 0.59),
     "iris_radius": (0.49,),

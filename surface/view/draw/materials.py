@@ -58,6 +58,8 @@ BEHIND_LIPS = ("teeth", "gums")
 WORN = ("strand", "cloth")
 #: Attributes of skin that are drawn by pixel, with quality "full": freckles, and the edge of the lips.
 FINE = ("freckles", "lips")
+#: Of skin with folds over the eyes, in both qualities.
+FOLD = "fold"
 #: What a head's skin has whose mesh brought a texture, drawn by pixel in every quality.
 TEXTURE = "texture"
 
@@ -113,12 +115,14 @@ def skin_program(
     ctx: moderngl.Context, quality: str, theme: Theme, *, simplified: bool = False, fine: Collection[str] = ()
 ) -> moderngl.Program:
     """The program of skin; `simplified` samples its grain unfiltered, for live pictures drawn in software; `fine` :
-    attributes of parts that quality "full" draws by pixel, of :data:`FINE`; and :data:`TEXTURE`."""
+    attributes of parts that quality "full" draws by pixel, of :data:`FINE`; :data:`FOLD`; and :data:`TEXTURE`."""
     defines: dict[str, int | str] = {"INSIDE": _INSIDE}
     scale: dict[str, int | str] = {"DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
     textured = TEXTURE in fine and theme.use_painted
     if textured:
         defines["TEXTURE"] = 1
+    if FOLD in fine and theme.use_painted and not textured:
+        defines["FOLD"] = 1
     if theme.lit:
         defines |= {"PANELS": 1} | scale
     if quality != "full":
@@ -180,6 +184,8 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
         fine["lips"] = attribute(part, "lips", (0.0,))  # of every part: they are drawn together
     if theme.use_painted and "texture_uv" in part.attributes:
         fine["texture_uv"] = part.attributes["texture_uv"]
+    if theme.use_painted and openings.folded:
+        fine[FOLD] = openings.fold_at(part)
     if "freckles" in part.attributes:
         fine["freckles"] = part.attributes["freckles"]
     lamp = {"lamp": openings.lip_line(part).astype(np.float32)[:, None]} if theme.lit else {}
@@ -222,6 +228,7 @@ def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[
         "gloss_scale": theme.gloss,
         "detail_strength": 0.16 * theme.detail,
         **({"lip_tint": openings.lip_tint} if theme.use_painted and openings.lip_tint else {}),
+        **({"fold_left": openings.fold_left()} if theme.use_painted and openings.folded else {}),
         **_lamps(theme),
     }
 

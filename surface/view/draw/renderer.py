@@ -69,6 +69,7 @@ class Renderer:
         self.openings = Openings(head.parts, lambda part, ids: self.evaluator.positions(part, ids), head.contacts)
         self._fine = ["freckles"] if any("freckles" in part.attributes for part in head.parts) else []
         self._fine += ["lips"] if self.openings.lip_tint else []
+        self._fine += [materials.FOLD] if self.openings.folded else []
         self._texture = texture_of(ctx, head, self.theme)
         self._fine += [materials.TEXTURE] if self._texture is not None else []
         used = {materials.material_of(part.material).program for part in head.parts}

@@ -15,6 +15,7 @@ import numpy as np
 from surface.head.model.data import Contact
 from surface.head.model.face import face_of
 from surface.mesh.mesh import border_edges
+from surface.view.scene.folds import Fold, fold_over
 from surface.view.scene.parts import ViewPart
 
 #: Points of one lid that the eye's shader gets.
@@ -102,6 +103,7 @@ class Openings:
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)
         self.lip_tint = lip_tint(self._skin)
+        self._folds = self._find_folds()
         area = np.array(_FALLBACK_AREA)
         if self._lips is not None and self._skin is not None:
             area = vector_area(self._read(self._skin, self._lips.loop))
@@ -113,8 +115,44 @@ class Openings:
         found = {name: frame.ids for name, frame in self._eyes.items()}
         edges = [edge for edge in (*(frame.lids for frame in self._eyes.values()), self._lips) if edge is not None]
         if self._skin is not None and edges:
-            found[self._skin.name] = np.unique(np.concatenate([i for e in edges for i in (e.loop, e.upper, e.lower)]))
+            folds = [fold.ids for fold in self._folds if fold is not None]
+            of_edges = [i for e in edges for i in (e.loop, e.upper, e.lower)]
+            found[self._skin.name] = np.unique(np.concatenate([*of_edges, *folds]))
         return found
+
+    def _find_folds(self) -> tuple[Fold | None, Fold | None]:
+        """The folds over the left eye, at x above 0, and the right one; none where the skin is painted without."""
+        found: list[Fold | None] = [None, None]
+        painted = None if self._skin is None else self._skin.attributes.get("fold")
+        if self._skin is None or painted is None or not painted[:, 0].any():
+            return None, None
+        for lids in (frame.lids for frame in self._eyes.values() if frame.lids is not None):
+            vertices = np.asarray(self._skin.vertices, float)
+            side = int(vertices[lids.upper, 0].mean() < 0.0)
+            found[side] = fold_over(vertices, lids.upper, lids.lower, np.asarray(painted, float))
+        return found[0], found[1]
+
+    @property
+    def folded(self) -> bool:
+        """Whether upper lids have a fold."""
+        return any(fold is not None for fold in self._folds)
+
+    def fold_at(self, part: ViewPart) -> np.ndarray:
+        """Where a part's vertices are relative to the lids' folds, (m, 2) float32: height over the crease, mm, and how
+        deep it is there, below 0 at the right eye."""
+        out = np.zeros((len(part.vertices), 2), np.float32)
+        if self._skin is None or part.name != self._skin.name:
+            return out
+        for fold, sign in zip(self._folds, (1.0, -1.0), strict=True):
+            if fold is not None:
+                own = sign * np.asarray(part.vertices)[:, 0] > 0.0
+                out[own] = fold.at[own] * (1.0, sign)
+        return out
+
+    def fold_left(self) -> tuple[float, float]:
+        """How deep the folds of the left and the right lid are now, of what they are at rest."""
+        left = [0.0 if f is None or self._skin is None else f.left(self._read(self._skin, f.ids)) for f in self._folds]
+        return left[0], left[1]
 
     def _eye(self, part: ViewPart, loops: list[np.ndarray]) -> EyeFrame:
         """Frame and lids of one eyeball."""

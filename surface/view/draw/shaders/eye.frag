@@ -1,3 +1,8 @@
+#define CORNEA 1.327             // radius of the cornea's sphere, in radii of the iris (Gullstrand)
+#define REFRACTION 0.749         // of air against aqueous humour
+#define DEEP 0.10                // of the iris behind the limbus, in its radii
+#define SMALLER 1.06             // what the cornea enlarges, made up for
+#define FLATTEST 0.45            // slope of a look inside it: a flatter one would see the pupil beside the limbus
 #define SINKING 1.7              // of what a lamp mirrors, with the height of a gaze below the horizon
 
 uniform sampler2D detail;
@@ -66,6 +71,15 @@ float windows(vec3 mirrored) {
     return pane * (1.0 - smoothstep(0.21, 0.27, at.y));
 }
 
+// Where a look from `v`, in the eye's own frame, into the cornea at `at` meets the iris, which lies flat behind it.
+vec2 on_iris(vec2 at, vec3 v) {
+    vec2 rim = at / iris_radius;
+    float dome = sqrt(max(CORNEA * CORNEA - dot(rim, rim), CORNEA * CORNEA - 1.0));
+    vec3 into = refract(-v, normalize(vec3(rim, dome)), REFRACTION);
+    float depth = dome - sqrt(CORNEA * CORNEA - 1.0) + DEEP;
+    return SMALLER * iris_radius * (rim + into.xy * depth / max(-into.z, FLATTEST));
+}
+
 void main() {
     vec3 d = normalize(v_local);
     vec3 v = normalize(v_view);
@@ -73,13 +87,12 @@ void main() {
     float r = length(d.xy);
     vec3 lid = to_lids();
 
-    // The iris lies under the cornea: looked at from the side it slides away from the viewer.
-    vec3 v_own = v * eye_rotation;
-    vec2 p = d.xy - v_own.xy / max(v_own.z, 0.35) * 0.09 * (1.0 - smoothstep(0.55, 1.25, r / iris_radius));
+    vec2 p = on_iris(d.xy, v * eye_rotation);
     float q = length(p) / iris_radius;
     float pupil = pupil_radius / iris_radius;
     float t = (q - pupil) / (1.0 - pupil);
-    vec3 albedo = mix(iris(p, t), sclera(d, r), smoothstep(0.90, 1.06, q));
+    float limbus = smoothstep(0.86, 1.10, r / iris_radius);
+    vec3 albedo = mix(iris(p, t), sclera(d, r), limbus);
 #ifdef TEXTURE
     vec2 size = texture_rectangle.zw - texture_rectangle.xy;
     if (size.x > 0.0)

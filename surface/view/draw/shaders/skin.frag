@@ -58,6 +58,10 @@ vec3 lips() {
 }
 #endif
 
+#ifdef FOLD
+in vec2 v_fold;
+#endif
+
 #ifdef PANELS
 in float v_lamp;
 #endif
@@ -98,6 +102,9 @@ void main() {
     lit *= textured();
 #endif
     lit += key_colour * ((wide * v_normal_wide.w + narrow * v_half_narrow.w) * (1.0 + PORES_DULL * grain.w));
+#ifdef FOLD
+    lit *= folded(v_fold.x, v_fold.y);
+#endif
 #ifdef FRECKLES
     lit *= mix(vec3(1.0), vec3(0.76, 0.62, 0.52), freckle());
 #endif

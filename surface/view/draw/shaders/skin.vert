@@ -20,6 +20,11 @@ out float v_freckles;
 in float lips;              // 1 on lips, 0.5 at their edge
 out float v_lips;
 #endif
+#ifdef FOLD
+in vec2 fold;               // height over the crease of the upper lid, mm; how deep it is, below 0 at the right eye
+uniform vec2 fold_left;     // how deep both are now, of what they are at rest
+out vec2 v_fold;
+#endif
 #ifdef TEXTURE
 in vec2 texture_uv;         // in the head's own skin texture
 out vec2 v_texture;
@@ -45,6 +50,9 @@ void main() {
 #endif
 #ifdef LIPS
     v_lips = lips;
+#endif
+#ifdef FOLD
+    v_fold = vec2(fold.x, abs(fold.y) * (fold.y < 0.0 ? fold_left.y : fold_left.x));
 #endif
 #ifdef TEXTURE
     v_texture = texture_uv;

@@ -9,6 +9,10 @@ in vec3 normal;
 in vec4 albedo_occlusion;
 in vec4 around;               // which way the surroundings lie, as baked
 in vec4 surface_uv_gloss;
+#ifdef FOLD
+in vec2 fold;                 // as in skin.vert
+uniform vec2 fold_left;
+#endif
 #ifdef PANELS
 in float lamp;                // how much of the lamps' light it sends out
 
@@ -36,6 +40,9 @@ void main() {
         * (WIDE * wide + SMEARED * narrow);
     vec3 lit = diffuse(normal, v, albedo, albedo_occlusion.a, sun, reaching(around, rim_at_rest), surface_uv_gloss.w);
     lit += shine * key_colour + satin(normal, v, albedo.r, albedo_occlusion.a, surface_uv_gloss.z);
+#ifdef FOLD
+    lit *= folded_softly(fold.x, abs(fold.y) * (fold.y < 0.0 ? fold_left.y : fold_left.x));
+#endif
 #ifdef PANELS
     v_light = lit;
     v_uv = surface_uv_gloss.xy;

@@ -54,7 +54,8 @@ def test_layers_lie_on_each_other_and_other_parts_get_none():
     two = [white, layer(kind="all", attribute="albedo", value=[0, 0, 1], amount=0.5)]
     np.testing.assert_allclose(paint_part(two, "face", UV, "")["albedo"], np.tile([0.5, 0.5, 1], (len(UV), 1)))
     assert paint_part(two, "back", UV, "") == {}
-    assert set(BASE) == {"albedo", "occlusion", "occlusion_floor", "gloss", "lips", "iris", "sclera", "iris_radius"}
+    own = {"albedo", "occlusion", "occlusion_floor", "gloss", "lips", "fold", "iris", "sclera", "iris_radius"}
+    assert set(BASE) == own
 
 
 @pytest.mark.parametrize(
