@@ -114,7 +114,8 @@ def test_positions_are_those_of_the_head(screen: Offscreen, head: Head) -> None:
     head.pose(values)
     for name, ids in screen.renderer.openings.read_vertices().items():
         found = screen.renderer.evaluator.positions(head.part(name), ids)
-        np.testing.assert_allclose(found, head.part(name).vertices[ids], rtol=0, atol=0.01)  # mm; seams overlap beside lines of fewer vertices
+        # mm: seams overlap beside lines of fewer vertices
+        np.testing.assert_allclose(found, head.part(name).vertices[ids], rtol=0, atol=0.01)
 
 
 def test_the_head_poses_as_before_whatever_is_drawn(screen: Offscreen, head: Head) -> None:
