@@ -31,15 +31,12 @@ ROOT_MM = 0.4  # height above the skin of the lashes' roots: its triangles may b
 LASH_ROOT = (0.0145, 0.0188)  # how far outside the hole in the skin lower and upper lashes begin, in v
 LASH_MM, LOWER_LASH_MM = 8.0, 3.0
 STRIP_BUDGET = {"brow": (0, 0.4, 6), "lash": (0, 0.6, 6)}  # fine enough for single hairs
-LASHES, LOWER_LASHES = (
-    (21, 19),
-    (20,),
-)  # in each strip: those of one lid lie over each other, for a cell cuts few hairs cleanly
+LASHES, LOWER_LASHES = 30, 18  # along a lid: finer or more would be cut into pieces
 LASH_LINES = {
     True: (0.02, 0.95, 27),
     False: (0.10, 0.94, 22),
 }  # where upper and lower lashes grow along a lid, samples
-INNER_LASH = 0.24, 0.55  # length of the innermost lash, of the longest; its width, of a lash's beyond the middle
+INNER_LASH = 0.24, 0.8  # length of the innermost lash, of the longest; its width, of a lash's beyond the middle
 BESIDE = 0.15  # in radii of an eyeball: so near to their own surface half the control points that keep to it have to be
 BENT = 0.04  # in radii: more than this a strip that keeps to an eyeball may not lie beside a shape that was fitted
 BROW_MM = (4.2, 4.6)  # how far a brow reaches below and above its line
@@ -114,13 +111,8 @@ def lash_strip(skin: Skin, root: Floats, eye: Floats, length: Floats, *, upper: 
         np.stack(rows, axis=2),
         10,
         3,
-        [comb(hairs, lean=0.012, thick=0.19 if upper else 0.2, inner=INNER_LASH[1], seed=hairs)],
+        [comb(hairs, lean=0.012, thick=0.36 if upper else 0.42, inner=INNER_LASH[1], seed=hairs)],
     )
-
-
-def lash_counts(*, upper: bool) -> tuple[int, ...]:
-    """Hairs in each strip of one lid's lashes."""
-    return LASHES if upper else LOWER_LASHES
 
 
 def lash_length(along: Floats) -> Floats:
@@ -259,7 +251,8 @@ def hair_parts(mesh: FitMesh, chart: Chart, fitted: Fitted, brow: list[int], rig
         for upper in (True, False):
             root, along = _lid_line(rim, upper=upper, inner_first=is_left)
             length = (LASH_MM if upper else LOWER_LASH_MM) * lash_length(along)
-            lashes += [lash_strip(skin, root, eye, length, upper=upper, hairs=n) for n in lash_counts(upper=upper)]
+            hairs = LASHES if upper else LOWER_LASHES
+            lashes.append(lash_strip(skin, root, eye, length, upper=upper, hairs=hairs))
     return [strips_part(n, m, s, rig) for n, m, s in (("brows", "brow", brows), ("lashes", "lash", lashes))]
 
 
