@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -13,22 +12,18 @@ from surface.export.textures import eye_column, materials, png_bytes
 from surface.readers.meshdata import kind_of_picture, srgb
 
 
-@dataclass
 class ObjMaterials:
     """The materials of parts, in the order in which they are first used.
 
-    names : of each part's material. pictures : of the files beside the OBJ, by name.
+    names : of each part's material. pictures : whole files that lie beside the OBJ, by name.
     """
 
-    parts: Sequence[ExportPart]
-    names: list[str] = field(init=False)
-    pictures: dict[str, bytes] = field(init=False, default_factory=dict)
-    _shown: dict[str, tuple[str, str | None, list[ExportPart]]] = field(init=False, default_factory=dict)
-
-    def __post_init__(self) -> None:
+    def __init__(self, parts: Sequence[ExportPart]) -> None:
+        self.names = list[str]()
+        self.pictures: dict[str, bytes] = {}
+        self._shown: dict[str, tuple[str, str | None, list[ExportPart]]] = {}
         files = dict[bytes, str]()
-        self.names = []
-        for part in self.parts:
+        for part in parts:
             picture = _picture_of(part)
             if picture and picture not in files:
                 word = f"{part.material}_{len(files) + 1}" if files else part.material

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 
 from surface import DCPSurface
+from surface.head import save_data
 from surface.head.model.data import Group, HeadData, Jaw, Neck, PartData, Seam
+from surface.head.model.meshes import make_surface, pack, tessellate
 
 KNOTS = [0, 0, 0, 0, 0.5, 1, 1, 1, 1]
 JAW = Jaw(
@@ -50,3 +55,11 @@ def small_head(**other) -> HeadData:
         **other,
     }  # fmt: skip
     return HeadData(**fields)
+
+
+def save_small_head(folder: Path) -> Path:
+    """Write :func:`small_head` with stored meshes; return its folder."""
+    data = small_head()
+    parts = [replace(p, mesh=pack(tessellate(p, make_surface(p), data.seams), p.budget)) for p in data.parts]
+    save_data(folder, replace(data, parts=parts))
+    return folder

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_head import KNOTS, small_head
+from small_head import KNOTS, save_small_head, small_head
 
 from controller.base.paths import find_config
 from surface import DCPSurface
 from surface.head import Head, save_data
 from surface.head.model.light import LightPoints
-from surface.head.model.meshes import make_surface, pack, tessellate
 from surface.head.posing.part import HeadPart
 
 CHORD_MM = 0.02
@@ -22,10 +21,7 @@ CHORD_MM = 0.02
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     """A head of two curved patches with stored meshes."""
-    data = small_head()
-    parts = [replace(p, mesh=pack(tessellate(p, make_surface(p), data.seams), p.budget)) for p in data.parts]
-    save_data(tmp_path, replace(data, parts=parts))
-    return tmp_path
+    return save_small_head(tmp_path)
 
 
 def farthest_mm(part: HeadPart) -> float:

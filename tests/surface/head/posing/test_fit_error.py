@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_head import small_head
+from small_head import save_small_head
 
 from surface.base.errors import HeadFileError
 from surface.head import Head, save_data
@@ -19,10 +19,7 @@ from surface.head.posing.fit_error import FIT_ERROR, read_fit_error, write_fit_e
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    data = small_head()
-    parts = [replace(p, mesh=pack(tessellate(p, make_surface(p), data.seams), p.budget)) for p in data.parts]
-    save_data(tmp_path, replace(data, parts=parts))
-    return tmp_path
+    return save_small_head(tmp_path)
 
 
 def errors(head: Head) -> np.ndarray:
