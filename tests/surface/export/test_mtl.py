@@ -63,6 +63,7 @@ def test_the_reader_takes_the_pictures_back(tmp_path: Path) -> None:
     export_head(textured(tmp_path / "head"), tmp_path / "h.obj")
     found = read_mtl(tmp_path, "h.mtl")
     assert found["skin"].texture == ramp() and found["eye"].texture
+    assert [blocks(tmp_path / "h.mtl")[name]["Kd"] for name in ("skin", "eye")] == ["1.0000 1.0000 1.0000"] * 2
     assert not found["skin_2"].texture
 
 

@@ -110,6 +110,18 @@ def test_the_same_points_get_the_same_answer_and_others_another() -> None:
     assert solver.apply(AHEAD, wider.copy()).max() < push.max()
 
 
+def test_lips_that_become_round_meet_towards_the_corners_alone_at_the_same_points() -> None:
+    apart = lips(0.0).points.copy()
+    apart[N * N :, 1] += 3.0  # the upper side
+    solver = ContactSolver(contact(), lips(0.0), small_head())
+    assert not solver.apply(AHEAD, apart.copy()).any()
+    push = solver.apply(AHEAD, apart.copy(), rounding=1.0).reshape(2, COLUMNS).copy()
+    assert (push[:, [0, -1]] < -2.0).all() and not push[:, COLUMNS // 2].any()
+    half = solver.apply(AHEAD, apart.copy(), rounding=0.5).reshape(2, COLUMNS)
+    assert (half[:, [0, -1]] > 0.7 * push[:, [0, -1]]).all()
+    assert not solver.apply(AHEAD, apart.copy()).any()
+
+
 def test_another_part_follows_the_side_it_is_near_to() -> None:
     surface = lips(1.5)
     head, c = small_head(), contact()
