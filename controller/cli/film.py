@@ -58,7 +58,7 @@ def render_film(still: Still, out: Path, take: Path, sound: Path | None, rate_hz
         task = bar.add_task("drawing", total=len(motion.values))
         rows = base_of(still, motion.values, motion.mask)
         count = draw_film(still, rows, out, fps, None if silent else track,
-                          lambda done, total: bar.update(task, completed=done))  # fmt: skip
+                          lambda done, total: bar.update(task, completed=done), motion.lives)  # fmt: skip
     described = _describe_sound(track, silent=silent)
     console.print(f"{count} frames at {fps:g} per second, {described}", soft_wrap=True, markup=False)
     console.print(f"wrote {out}", soft_wrap=True)

@@ -9,6 +9,7 @@ import numpy as np
 
 from controller.base.parameters import Floats
 from controller.face.still import Still, for_head
+from controller.layers.idle.motion import IdleMotion
 from surface.head.model.parameters import head_angles
 from surface.view.pictures.clip import write_clip
 from surface.view.pictures.offscreen import Offscreen
@@ -25,20 +26,45 @@ def draw_film(
     fps: float = FPS,
     sound: Path | None = None,
     progress: Callable[[int, int], None] = lambda done, total: None,
+    lives: Floats | None = None,
 ) -> int:
     """Draw the head of ``still`` with each row of values, and write the clip, completely or not at all.
 
     rows : (n, P) float64, one for each frame. out : .mp4, .webp or .gif. sound : sound file for a .mp4.
-    progress : called with (done, total).
+    progress : called with (done, total). lives : (n, 2) breath and pupils of each frame, see
+    :meth:`surface.head.Head.live`; None: those of the stage's idle motion.
 
     Returns the number of frames that were written.
 
     Raises ViewError: see :func:`surface.view.pictures.clip.write_clip`, or OpenGL is missing.
     """
-    return write_clip(_pictures(still, rows, fps, progress), out, fps=fps, sound=sound)
+    return write_clip(
+        _pictures(still, rows, fps, progress, idle_lives(still, len(rows), fps) if lives is None else lives),
+        out,
+        fps=fps,
+        sound=sound,
+    )
 
 
-def _pictures(still: Still, rows: Floats, fps: float, progress: Callable[[int, int], None]) -> Iterator[np.ndarray]:
+def idle_lives(still: Still, count: int, fps: float) -> Floats:
+    """Return (count, 2): breath and pupils of idle motion in each frame, by the settings and the seed of the stage.
+
+    They are 0 without a stage, or for one whose liveliness is 0, as in a run.
+    """
+    stage, lives = still.stage, np.zeros((count, 2))
+    if stage is None or stage.settings.liveliness <= 0.0:
+        return lives
+    motion = IdleMotion(still.parameters, stage.life, stage.settings.seed)
+    motion.liveliness = stage.settings.liveliness
+    for number in range(count):
+        motion.update(number / fps, looking=False)
+        lives[number] = motion.beside
+    return lives
+
+
+def _pictures(
+    still: Still, rows: Floats, fps: float, progress: Callable[[int, int], None], lives: Floats
+) -> Iterator[np.ndarray]:
     head, look = still.load_head(still.chord_mm), still.look
     camera = framed(look.make_camera(), head, worn=look.dressed)
     with Offscreen(
@@ -47,6 +73,7 @@ def _pictures(still: Still, rows: Floats, fps: float, progress: Callable[[int, i
         for number, row in enumerate(rows):
             values = for_head(row, head.parameters, still.parameters)
             head.sway.advance(head_angles(values), number / fps)
+            head.live(*lives[number].tolist())
             yield screen.render(values, camera)
             progress(number + 1, len(rows))
 

@@ -48,7 +48,8 @@ class Still:
     head : folder of the head. identity : its variations, by name. groups : group files and their amounts.
     vocabulary : the named expressions. persons : the persons that it shows, each with its weight.
     parameters : those of the stage and of the named vocabularies.
-    wall : a stage of several heads, which are all drawn; None for one head.
+    wall : a stage of several heads, which are all drawn; None for one head. stage : whose idle motion films show; None
+    without a stage.
     """
 
     values: NDArray[np.float64]
@@ -61,6 +62,7 @@ class Still:
     persons: tuple[tuple[Person, float], ...] = ()
     parameters: Parameters = field(default_factory=lambda: PARAMETERS)
     wall: Stage | None = None
+    stage: Stage | None = None
 
     @classmethod
     def parse(
@@ -93,7 +95,7 @@ class Still:
         wall = None
         if base is not None and base.heads and head is None:
             wall = with_picture(base, look or {})
-        return cls(values, width_height, picture, folder, wanted, added, vocabulary, persons, parameters, wall)
+        return cls(values, width_height, picture, folder, wanted, added, vocabulary, persons, parameters, wall, base)
 
     def load_head(self, chord_mm: float | None = None) -> Head:
         """Load the head with its persons, identity and groups; see :func:`controller.stage.stage.load_head`."""

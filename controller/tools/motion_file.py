@@ -33,13 +33,15 @@ class Motion:
     """Parameter values over time.
 
     name : for people. times_s : (n,) float64, ascending from 0. values : (n, P) float64 in range. mask : (P,) bool,
-    the parameters that it moves.
+    the parameters that it moves. lives : (n, 2) breath and pupils that a recording shows beside them, see
+    :meth:`surface.head.Head.live`; None for takes and shows, which have none.
     """
 
     name: str
     times_s: Floats
     values: Floats
     mask: Flags
+    lives: Floats | None = None
 
     def with_rest(self) -> Floats:
         """Return (n, P + 1): the values, and a last column of zeros for names that are not parameters."""
@@ -57,15 +59,28 @@ def load_motion(path: Path, parameters: Parameters, rate_hz: float | None = None
     if path.suffix.lower() == _SCRIPT:
         return _resample(path.name, *_play_show(path, parameters), rate_hz or SHOW_HZ)
     if path.suffix == SUFFIX:
-        ticks = [(now_ns * 1e-9, values.copy()) for now_ns, values in replay(path, parameters)]
-        if not ticks:
-            raise TakeError(f"{path}: nothing is recorded in it", hint="record it again")
-        times, rows = np.array([time for time, _ in ticks]), np.array([row for _, row in ticks])
-        return _resample(path.name, times - times[0], rows, rate_hz or SHOW_HZ)
+        return _load_recording(path, parameters, rate_hz or SHOW_HZ)
     take = load_take(path, parameters) if model is None else network_take(path, model, parameters)
     times = take.times_s if rate_hz is None else _grid(take.duration_s, rate_hz)
     values = np.array([take.sample(float(t), parameters.neutral()) for t in times])
     return Motion(take.name, *_drop_repeated_times(times, values), take.mask)
+
+
+def _load_recording(path: Path, parameters: Parameters, rate_hz: float) -> Motion:
+    """Return the motion of a recording, with the breath and pupils of its idle motion."""
+    states: list[CommandState] = []
+
+    def make(of: Parameters, seed: int, period_s: float) -> CommandState:
+        states.append(CommandState(of, seed=seed, period_s=period_s))
+        return states[0]
+
+    ticks = [(now_ns * 1e-9, row.copy(), states[0].beside) for now_ns, row in replay(path, parameters, make=make)]
+    if not ticks:
+        raise TakeError(f"{path}: nothing is recorded in it", hint="record it again")
+    times, rows, lives = (np.array(column) for column in zip(*ticks, strict=True))
+    times -= times[0]
+    motion = _resample(path.name, times, rows, rate_hz)
+    return replace(motion, lives=np.stack([np.interp(motion.times_s, times, column) for column in lives.T], axis=1))
 
 
 def _play_show(path: Path, parameters: Parameters) -> tuple[Floats, Floats]:

@@ -75,6 +75,18 @@ def test_a_recording_is_what_its_ticks_were(tmp_path: Path) -> None:
     np.testing.assert_allclose(motion.values[:, JAW], np.array(rows)[::2], atol=1e-9)
 
 
+def test_a_recording_keeps_breath_and_pupils_of_its_idle_motion(tmp_path: Path) -> None:
+    shown, out = [], P.neutral()
+    with recorded(CommandState(P, seed=5), tmp_path / "r.rec", seed=5) as state:
+        state.live(1.0, 0)
+        for k in range(200):
+            state.tick(10_000_000 * (k + 1), 0.01, out)
+            shown.append(state.beside)
+    lives = load_motion(tmp_path / "r.rec", P, 100.0).lives
+    assert lives is not None and lives[:, 0].max() > 1.0
+    np.testing.assert_allclose(lives, shown, atol=1e-9)
+
+
 def test_what_cannot_be_converted_is_named(tmp_path: Path) -> None:
     (tmp_path / "a.csv").write_text(TAKE)
     with pytest.raises(TakeError, match=r"tables of parameters are \.csv files"):
