@@ -31,23 +31,20 @@ def draw_film(
     """Draw the head of ``still`` with each row of values, and write the clip, completely or not at all.
 
     rows : (n, P) float64, one for each frame. out : .mp4, .webp or .gif. sound : sound file for a .mp4.
-    progress : called with (done, total). lives : (n, 2) breath and pupils of each frame, see
-    :meth:`surface.head.Head.live`; None: those of the stage's idle motion.
+    progress : called with (done, total). lives : (n, 2) float64, for each frame how far breath lifts the chest, mm, and
+    the share by which pupils are wider, see :meth:`surface.head.Head.live`; None: those of the stage's idle motion.
 
     Returns the number of frames that were written.
 
     Raises ViewError: see :func:`surface.view.pictures.clip.write_clip`, or OpenGL is missing.
     """
-    return write_clip(
-        _pictures(still, rows, fps, progress, idle_lives(still, len(rows), fps) if lives is None else lives),
-        out,
-        fps=fps,
-        sound=sound,
-    )
+    shown = idle_lives(still, len(rows), fps) if lives is None else lives
+    return write_clip(_pictures(still, rows, fps, progress, shown), out, fps=fps, sound=sound)
 
 
 def idle_lives(still: Still, count: int, fps: float) -> Floats:
-    """Return (count, 2): breath and pupils of idle motion in each frame, by the settings and the seed of the stage.
+    """Return (count, 2) float64: breath, mm, and pupils, a share, of idle motion in each frame, by the settings and the
+    seed of the stage.
 
     They are 0 without a stage, or for one whose liveliness is 0, as in a run.
     """

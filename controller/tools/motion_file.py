@@ -33,8 +33,8 @@ class Motion:
     """Parameter values over time.
 
     name : for people. times_s : (n,) float64, ascending from 0. values : (n, P) float64 in range. mask : (P,) bool,
-    the parameters that it moves. lives : (n, 2) breath and pupils that a recording shows beside them, see
-    :meth:`surface.head.Head.live`; None for takes and shows, which have none.
+    the parameters that it moves. lives : (n, 2) float64 breath, mm, and pupils, a share, that a recording shows
+    beside them, see :meth:`surface.head.Head.live`; None for takes and shows, which have none.
     """
 
     name: str
