@@ -1,9 +1,11 @@
 """Shapes made stronger before a fit: by a factor, and by pulls on places of the face."""
 
+from dataclasses import replace
+
 import numpy as np
 from slit_sheet import slit_sheet
 
-from surface.fit.points.strength import Pull, Strength, strengthen
+from surface.fit.points.strength import Pull, Smoothing, Strength, strengthen
 from surface.fit.source.mesh import FitMesh
 
 FROWN = Strength("browDown", pulls=(Pull((13.0, 59.0), (11.0, 9.0), (-2.8, -1.8, 0.6)),))
@@ -65,3 +67,39 @@ def test_a_recipes_table_becomes_a_strength():
     table = {"shape": "browDown", "pulls": [{"centre": (13.0, 59.0), "reach": (11.0, 9.0), "move": (-2.8, -1.8, 0.6)}]}
     assert Strength.of(table) == FROWN
     assert Strength.of({"shape": "jaw", "scale": 1.5}) == Strength("jaw", 1.5)
+
+
+def _sheet(lumps: float) -> FitMesh:
+    """The front of a face as a flat grid of 2 mm, which rises by y / 10 mm, with lumps of so many mm, 4 mm long."""
+    y, x = np.mgrid[-40.0:41.0:2.0, -60.0:61.0:2.0].reshape(2, -1)
+    mesh = cloud(np.column_stack([x, y, np.full(len(x), 100.0)]), ("noseSneerLeft", "noseSneerRight", "jawOpen"))
+    mesh.deltas[..., 2] = y / 10 + lumps * np.cos(np.pi * x / 2)
+    return mesh
+
+
+def test_lumps_beside_the_nose_go_and_what_is_smooth_or_elsewhere_stays() -> None:
+    place = Smoothing((25.0, 0.0), (10.0, 20.0), 4.0)
+    before = _sheet(1.0)
+    after = strengthen(before, [Strength("noseSneer", smoothed=(place,))]).deltas
+    plain = _sheet(0.0).deltas
+    for shape, side in ((0, 1.0), (1, -1.0)):
+        x, y = before.vertices[:, 0] * side, before.vertices[:, 1]
+        away = np.hypot((x - 25) / 10, y / 20)
+        assert np.abs(after[shape] - plain[shape])[away < 0.69].max() < 0.02
+        np.testing.assert_array_equal(after[shape][away > 1.6], before.deltas[shape][away > 1.6])
+        between = np.abs(after[shape] - plain[shape])[(away > 1.0) & (away < 1.3), 2]
+        assert between.min() > 0.1 and between.max() < 0.9
+    np.testing.assert_array_equal(after[2], before.deltas[2])
+
+
+def test_smoothing_comes_after_pulls_and_leaves_the_back_of_the_head() -> None:
+    table = {"shape": "noseSneer", "pulls": [{"centre": (25.0, 0.0), "reach": (3.0, 3.0), "move": (0.0, 0.0, 5.0)}]}
+    smooth = {"smoothed": [{"centre": (25.0, 0.0), "reach": (10.0, 20.0), "width": 4.0}]}
+    sheet = _sheet(0.0)
+    at = np.flatnonzero((sheet.vertices[:, :2] == [26.0, 0.0]).all(axis=1))
+    pulled, both = (strengthen(sheet, [Strength.of(t)]).deltas[0, at, 2] for t in (table, table | smooth))
+    assert both < 0.6 * pulled
+    behind = replace(_sheet(1.0), vertices=sheet.vertices - [0.0, 0.0, 60.0])
+    np.testing.assert_array_equal(
+        strengthen(behind, [Strength.of(smooth | {"shape": "noseSneer"})]).deltas, behind.deltas
+    )
