@@ -46,17 +46,19 @@ class Middles:
         return found
 
 
-def split_edges(triangles: Ints, wanted: Callable[[Ints], Bools], middles: Middles) -> Ints:
-    """Return triangles (t', 3) with every wanted edge split once; border edges are not split.
+def split_edges(triangles: Ints, wanted: Callable[[Ints], Bools], middles: Middles, *, borders: bool = False) -> Ints:
+    """Return triangles (t', 3) with every wanted edge split once; border edges only with ``borders``.
 
     wanted : returns of edges (k, 2), lower end first, which to split. middles : numbers the new vertices.
     """
     edges = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2).astype(np.int64)
     low = np.sort(edges, axis=1)
     unique, back = np.unique(low, axis=0, return_inverse=True)
-    border = np.sort(border_edges(triangles.astype(np.int32)), axis=1)
-    size = int(triangles.max()) + 1
-    chosen = wanted(unique) & ~np.isin(unique @ [size, 1], border @ [size, 1])
+    chosen = wanted(unique)
+    if not borders:
+        border = np.sort(border_edges(triangles.astype(np.int32)), axis=1)
+        size = int(triangles.max()) + 1
+        chosen &= ~np.isin(unique @ [size, 1], border @ [size, 1])
     marked = chosen[back.ravel()].reshape(-1, 3)
     kind = marked @ [1, 2, 4]
     corners = np.hstack([triangles, np.full((len(triangles), 3), -1)]).astype(np.int64)

@@ -1,5 +1,5 @@
-"""Meshes of skin that are rounder than the stored ones, for large pictures: there the outline of a skull shows the
-edges of its triangles."""
+"""Meshes of skin and clothes that are rounder than the stored ones, for large pictures: there the outline of a skull or
+a shoulder shows the edges of its triangles."""
 
 from __future__ import annotations
 
@@ -17,11 +17,13 @@ from surface.mesh.mesh import Mesh
 from surface.mesh.splitedges import split_edges
 
 MAX_ROUNDS = 6  # of splitting edges; each quarters how far they are from the surface
-MATERIAL = "skin"
+MATERIALS = ("skin", "cloth")
+LOOSE = "cloth"  # its borders are joined to no other part, so they may be split
 
 
 class Rounded(FinerMesh):
-    """A part's mesh with every edge inside it split that lies farther than ``chord_mm`` from the surface.
+    """A part's mesh with every edge inside it split that lies farther than ``chord_mm`` from the surface, and those at
+    the borders of clothes.
 
     before : how the mesh became finer already, whose vertices come before. coarser : fewer triangles over the mesh, by
     level, which stay as they are.
@@ -35,7 +37,7 @@ class Rounded(FinerMesh):
         triangles = np.asarray(mesh.triangles, np.int64)
         for _ in range(MAX_ROUNDS):
             count = len(triangles)
-            triangles = split_edges(triangles, self._is_far, self._middles)
+            triangles = split_edges(triangles, self._is_far, self._middles, borders=part.material == LOOSE)
             self._place()
             if len(triangles) == count:
                 break
@@ -54,10 +56,11 @@ class Rounded(FinerMesh):
         return super().carry(values if self._before is None else self._before.carry(values))
 
 
-def with_rounder_skin(
+def with_rounder_outlines(
     data: HeadData, chord_mm: float, refined: Mapping[str, FinerMesh], coarser: Coarser
 ) -> tuple[HeadData, dict[str, FinerMesh]]:
-    """Return the head with skin whose edges lie at most ``chord_mm`` (mm) from its surface at rest, borders excepted.
+    """Return the head with skin and clothes whose edges lie at most ``chord_mm`` (mm) from their surface at rest,
+    borders of skin excepted.
 
     refined : the parts that became finer before. coarser : fewer triangles over the mesh of any other part, by level.
     Returns them and those of this call, too, by part.
@@ -77,6 +80,6 @@ def with_rounder_skin(
 
 
 def _is_rounded(part: PartData, chord_mm: float) -> bool:
-    """Whether a part is skin that may lie farther from its surface, and its (u, v) end somewhere."""
+    """Whether a part is skin or cloth that may lie farther from its surface, and its (u, v) end somewhere."""
     open_ended = part.closed_u is None and part.closed_v is None
-    return part.material == MATERIAL and part.budget[1] > chord_mm and open_ended
+    return part.material in MATERIALS and part.budget[1] > chord_mm and open_ended

@@ -25,6 +25,7 @@ import numpy as np
 from surface.base.arrays import Array, Floats, Floats32
 from surface.base.errors import HeadFileError
 from surface.head.model.data import Group, HeadData, PartData
+from surface.head.model.finer_mesh import FinerMesh
 from surface.head.model.look import Worn
 from surface.head.model.meshes import KEYS, make_surface
 from surface.head.model.sidecar import DAMAGED, Sidecar, read_sidecar, reason
@@ -35,6 +36,7 @@ OTHER_HEAD = "leave out hair, beard and clothes"
 STORED = ("points", "anchor", "degrees", "knots_u", "knots_v", "follow", "sway", "strands", "tint", "shade", "fast")
 BY_POINT = {"points": (3,), "anchor": (3,), "degrees": (2,), "follow": (), "sway": ()}  # shape of a row of each
 BY_VERTEX = {"mesh_uv": (2,), "strands": (4,), "tint": (), "shade": (), "mesh_side": ()}
+DRAWN = ("strands", "tint", "shade")  # what dresses the vertices of a mesh
 FIELDS = ("cover", "hidden", "shadow")
 MAX_NAMES, MAX_NAME_BYTES = 64, 512  # names; bytes, four a character
 
@@ -119,6 +121,18 @@ def _check_rows(part: WornPart) -> None:
     for name in ("fast", "mesh_triangles"):
         if a[name].ndim != 2 or a[name].shape[1] != 3 or a[name].min() < 0 or a[name].max() >= len(a["mesh_uv"]):
             raise ValueError(f"{part.name}/{name} is no table of triangles of its {len(a['mesh_uv'])} vertices")
+
+
+def carried(garment: Garment, finer: Mapping[str, FinerMesh]) -> Garment:
+    """Return the garment for meshes that became finer, by part: new vertices are dressed as those around them."""
+
+    def carry(worn: WornPart) -> WornPart:
+        mesh = finer.get(worn.name)
+        if mesh is None or len(mesh.mesh.uv) != len(worn.arrays["strands"]):  # of another mesh: refused as it is put on
+            return worn
+        return replace(worn, arrays={**worn.arrays, **{key: mesh.carry(worn.arrays[key]) for key in DRAWN}})
+
+    return replace(garment, parts=tuple(carry(worn) for worn in garment.parts))
 
 
 def with_garments(head: HeadData, garments: tuple[Garment, ...], where: str) -> HeadData:

@@ -20,12 +20,12 @@ from surface.head.model.look import Look, with_age, with_forehead
 from surface.head.model.meshes import make_surface, tessellate, unpack
 from surface.head.model.own_groups import OwnAmounts, OwnGroup, OwnMoves
 from surface.head.model.parameters import NAMES, SHAPES, Pose, read_pose, rotation
-from surface.head.model.rounding import with_rounder_skin
+from surface.head.model.rounding import with_rounder_outlines
 from surface.head.model.rules import Drivers
 from surface.head.model.sidecar import DAMAGED, reason
 from surface.head.model.sway import STEP_MM, WIDEST, Sway
 from surface.head.model.texture import HeadTexture, read_texture
-from surface.head.model.wardrobe import read_garment, with_garments
+from surface.head.model.wardrobe import carried, read_garment, with_garments
 from surface.head.posing.appearance import apply_look, apply_texture
 from surface.head.posing.dressing import WornMesh, dress
 from surface.head.posing.finer import apply_baked, coarser_of
@@ -82,8 +82,8 @@ class Head:
         identity : variations of the head to mix in, by name, each by 0 to 1.
         look : colours of a person, and what is worn; the head's own where it is None.
         light : control points to add behind those of each part, see :mod:`surface.head.model.light`.
-        chord_mm : how far edges of skin may lie from its surface, mm, where the head's own may lie farther: for large
-        pictures, whose outlines would show them; every pose takes longer.
+        chord_mm : how far edges of skin and clothes may lie from their surface, mm, where the stored ones may lie
+        farther: for large pictures, whose outlines would show them; every pose takes longer.
 
         Raises HeadFileError: a file is missing, damaged, cut short, of another version or made for another mesh (names
         file and key), or the head has no identity of that name. ValueError: control points that cannot be added.
@@ -97,7 +97,8 @@ class Head:
         if light:
             data, refined = with_light(data, light, partial(coarser_of, path))
         if chord_mm is not None:
-            data, refined = with_rounder_skin(data, chord_mm, refined, partial(coarser_of, path))
+            data, refined = with_rounder_outlines(data, chord_mm, refined, partial(coarser_of, path))
+            garments = tuple(carried(garment, refined) for garment in garments)
         accessories, texture = read_accessories(path), read_texture(path)
         try:
             head = cls(data, str(path))

@@ -1,7 +1,8 @@
-"""surface.head.model.rounding: skin whose outline is round in large pictures."""
+"""surface.head.model.rounding: skin and clothes whose outlines are round in large pictures."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,7 +13,12 @@ from small_head import KNOTS, save_small_head, small_head
 from controller.base.paths import find_config
 from surface import DCPSurface
 from surface.head import Head, save_data
+from surface.head.model.file import load_data
 from surface.head.model.light import LightPoints
+from surface.head.model.look import Worn
+from surface.head.model.meshes import make_surface
+from surface.head.model.rounding import with_rounder_outlines
+from surface.head.model.wardrobe import DRAWN, carried, read_garment, with_garments
 from surface.head.posing.part import HeadPart
 
 CHORD_MM = 0.02
@@ -28,10 +34,17 @@ def farthest_mm(part: HeadPart) -> float:
     """How far the middle of an edge lies from the surface, where two of the part's own triangles share it."""
     places, _, _ = part.surface.derivatives(part.mesh.uv, side=part.mesh.side)
     own = part.triangles[(part.triangles < len(part.mesh.uv)).all(axis=1)]
-    edges = np.sort(own[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    return farthest_middle(part.surface, part.mesh.uv, places, own)
+
+
+def farthest_middle(
+    surface: DCPSurface, uv: np.ndarray, places: np.ndarray, triangles: np.ndarray, least: int = 2
+) -> float:
+    """How far the middle of an edge of ``least`` triangles (t, 3) lies from the surface; uv (m, 2), places (m, 3)."""
+    edges = np.sort(triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     unique, count = np.unique(edges, axis=0, return_counts=True)
-    inner = unique[count == 2]
-    middle = part.surface.evaluate(part.mesh.uv[inner].mean(axis=1))
+    inner = unique[count >= least]
+    middle = surface.evaluate(uv[inner].mean(axis=1))
     return float(np.linalg.norm(middle - places[inner].mean(axis=1), axis=1).max())
 
 
@@ -82,6 +95,35 @@ def test_round_skin_may_have_added_points_too(folder: Path) -> None:
     assert np.abs(both.part("a").vertices[:count] - only.part("a").vertices[:count]).max() < 1e-4
     assert farthest_mm(both.part("a")) <= CHORD_MM < farthest_mm(only.part("a"))
     assert both.part("a").surface.n == len(KNOTS[:5]) ** 2 + 1
+
+
+def test_clothes_become_rounder_and_stay_dressed() -> None:
+    shirt = read_garment(Worn(find_config("wardrobe", "clothes-shirt.npz"), (0.2, 0.2, 0.2)))
+    data = with_garments(load_data(find_config("heads", "ict")), (shirt,), "there")
+    cloth = next(part for part in data.parts if part.material == "cloth")
+    round_, finer = with_rounder_outlines(replace(data, parts=[cloth]), 0.1, {}, lambda name, mesh: {})
+
+    surface = make_surface(cloth)
+
+    def away_mm(mesh: Mapping[str, np.ndarray]) -> float:
+        uv = mesh["mesh_uv"]
+        places, _, _ = surface.derivatives(uv, side=mesh["mesh_side"])
+        return farthest_middle(surface, uv, places, mesh["mesh_triangles"], least=1)
+
+    assert away_mm(cloth.mesh) > 4.0 and away_mm(round_.parts[0].mesh) <= 0.1
+
+    (before,), (after,) = shirt.parts, carried(shirt, finer).parts
+    count = len(before.arrays["strands"])
+    ends = finer[cloth.name].ends
+    for key in DRAWN:
+        values = np.asarray(after.arrays[key], float)
+        assert len(values) == len(round_.parts[0].mesh["mesh_uv"]) and np.array_equal(
+            after.arrays[key][:count], before.arrays[key]
+        )
+        assert np.abs(values[count:] - values[ends].mean(axis=1)).max() <= 1.0, "rounded to whole numbers"
+    assert np.abs(after.arrays["strands"][count:] - after.arrays["strands"][ends].mean(axis=1)).max() < 1e-5
+    hair = replace(before, name="hair")
+    assert carried(replace(shirt, parts=(hair,)), finer).parts == (hair,), "no mesh of it became finer"
 
 
 @pytest.mark.slow
