@@ -2,7 +2,7 @@
 STOP switches the torque off: ``python -m benchmarks.web_panel``.
 
 The face is the shipped head with hair, at 1280 x 720 and device pixel ratio 1; every frame moves a quarter of all
-parameters. Run it with nothing else on the machine. Needs Chromium and the extras view and web.
+parameters, chest and pupils. Run it with nothing else on the machine. Needs Chromium and the extras view and web.
 """
 
 from __future__ import annotations
@@ -48,6 +48,7 @@ DRAW = """(() => {
     const swing = (k) => 0.3 * Math.sin(0.3 * i + k);
     const move = (name, k) => name.startsWith("head") ? swing(0) * 2 / 3 : k %% 4 ? 0 : 0.3 + swing(k);
     face.pose(robot.names, robot.names.map(move));
+    face.live?.([1.5 + 1.5 * Math.sin(0.1 * i), 0.05 * Math.sin(0.2 * i)]);
     face.changed = true;
     face.draw();
     gl.readPixels(0, 0, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import multiprocessing
 import shutil
@@ -10,6 +11,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from multiprocessing import synchronize
 from pathlib import Path
 from typing import Any
@@ -29,6 +31,9 @@ from surface.export.glb_web import web_glb
 from surface.head import Head
 from surface.head.model.parameters import NAMES, SHAPES, read_pose
 from surface.head.posing.dressing import WornMesh
+from surface.view.pictures.offscreen import Offscreen
+from surface.view.scene.camera import Camera
+from surface.view.scene.theme import THEMES
 from tests.browser import Page, find_chromium, page
 from tests.controller.links.net.sockets import wait_for
 from tests.surface.cards import card, picture
@@ -156,6 +161,92 @@ def test_accessories_are_drawn_with_their_texture_and_blended_with_their_opacity
         red, green_light, blue = np.moveaxis(np.asarray(image.convert("RGB")).astype(int)[60:620, :700], 2, 0)
     assert ((green_light > 80) & (np.maximum(red, blue) < 0.6 * green_light)).sum() > 500
     assert ((blue > red + 30) & (blue > green_light + 20) & (red > 20)).sum() > 500  # some of what is behind it
+
+
+def drawn_alone(browser: Page, life: tuple[float, float], at: str, away: float) -> np.ndarray:
+    """The page's picture with a breath (mm) and pupils (share), (height, width, 4) uint8, from straight in front of a
+    place of the page, metres; alpha is 0 around the head."""
+    browser.evaluate(f"""(() => {{
+      const {{ face }} = omote, gl = face.renderer.getContext(), w = gl.drawingBufferWidth, h = gl.drawingBufferHeight;
+      for (const name of ["live", "pose"]) face[name] = () => {{}};  // what the robot sends is not shown
+      Object.getPrototypeOf(face).live.call(face, {json.dumps(life)});
+      face.target.copy({at});
+      Object.assign(face.turn, {{ yaw: 0, pitch: 0, reach: 1 }});
+      face.size = 2 * Math.tan(face.camera.fov * Math.PI / 360) * {away};
+      face.changed = true;
+      face.draw();
+      const pixels = new Uint8Array(4 * w * h);
+      gl.readPixels(0, 0, w, h, gl.RGBA, gl.UNSIGNED_BYTE, pixels);
+      globalThis.seen = {{ w, h, eye: face.camera.position.toArray(), target: face.target.toArray(),
+        pixels: btoa(Array.from(pixels, (each) => String.fromCharCode(each)).join("")) }};
+    }})()""")
+    width, height, pixels = browser.evaluate("[seen.w, seen.h, seen.pixels]")
+    return np.frombuffer(base64.b64decode(pixels), np.uint8).reshape(height, width, 4)[::-1]
+
+
+def drawn_by_omote(head: Head, life: tuple[float, float], browser: Page) -> np.ndarray:
+    """The same by omote's own renderer, as the page was drawn last."""
+    width, height, eye, target, fov_deg = browser.evaluate(
+        "[seen.w, seen.h, seen.eye, seen.target, omote.face.camera.fov]"
+    )
+    camera = Camera(tuple(1000.0 * np.array(eye)), tuple(1000.0 * np.array(target)), fov_deg)
+    green = replace(THEMES["skin"], background_top=(0.0, 1.0, 0.0), background_bottom=(0.0, 1.0, 0.0))
+    with Offscreen(head, (width, height), theme=green) as screen:
+        head.live(*life)
+        picture = screen.render(np.zeros(len(head.parameters)), camera)
+        head.live(0.0, 0.0)
+    around = picture[..., 1] > 100.0 + picture[..., [0, 2]].max(axis=2)
+    return np.dstack([picture, np.where(around, 0, 255).astype(np.uint8)])
+
+
+@pytest.mark.slow
+@needs_chromium
+def test_a_breath_and_pupils_are_as_large_as_in_omotes_own_picture(root: Path, tmp_path: Path) -> None:
+    head = Head.load(root / "configs" / "heads" / "ict")
+    with robot(tmp_path, head) as (_, _, where), page(CHROMIUM or "") as browser:
+        open_panel(browser, where, 1280, 720)
+        centre, eye = "face.target", json.dumps(dict(zip("xyz", (0.001 * head.data.eyes[0]).tolist(), strict=True)))
+        tops, holes = [], []
+        for life in ((0.0, 0.0), (3.0, 0.0)):
+            page_, own = drawn_alone(browser, life, centre, 0.7), drawn_by_omote(head, life, browser)
+            tops.append([shoulders(each) for each in (page_, own)])
+        for life in ((0.0, -0.2), (0.0, 0.25)):
+            page_, own = drawn_alone(browser, life, eye, 0.25), drawn_by_omote(head, life, browser)
+            holes.append([dark(each) for each in (page_, own)])
+        assert browser.errors == []
+    rises = np.subtract(tops[0], tops[1])
+    assert rises[1] > 2.0 and rises[0] == pytest.approx(rises[1], rel=0.1), rises
+    wider = np.sqrt(np.divide(holes[1], holes[0]))
+    np.testing.assert_allclose(wider, 1.25 / 0.8, rtol=0.1)
+
+
+def shoulders(picture: np.ndarray) -> float:
+    """Mean row of the highest pixel of the bust, in columns beside the head."""
+    middle = picture.shape[1] // 2
+    columns = picture[:, [*range(middle - 240, middle - 180), *range(middle + 180, middle + 240)], 3] > 0
+    return float(columns.argmax(axis=0)[columns.any(axis=0)].mean())
+
+
+def dark(picture: np.ndarray) -> int:
+    """Pixels of a pupil in the middle of a picture."""
+    height, width = picture.shape[:2]
+    middle = picture[height // 2 - 24 : height // 2 + 24, width // 2 - 24 : width // 2 + 24, :3].astype(int)
+    return int((middle.sum(axis=2) < 90).sum())
+
+
+@needs_chromium
+def test_the_panel_breathes_as_the_robot_does(tmp_path: Path) -> None:
+    with robot(tmp_path) as (body, _, where), page(CHROMIUM or "") as browser:
+        open_panel(browser, where, 1280, 720)
+        body.state.live(1.0, 1)
+        browser.evaluate(
+            "import('/shaders.js').then(({ shared }) => { Object.assign(globalThis, { shared, most: 0 }); "
+            "omote.robot.on('frame', () => { most = Math.max(most, shared.lungs.value); }); })"
+        )
+        browser.wait("shared.lungs.value > 2 && Math.abs(shared.wider.value) > 0.01")
+        body.state.live(0.0, 2)
+        browser.wait("shared.lungs.value === 0 && shared.wider.value === 0")
+        assert browser.evaluate("most") <= 3.0 and browser.errors == []
 
 
 @needs_chromium

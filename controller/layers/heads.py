@@ -10,6 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from controller.base.errors import ControllerError, ParameterError
+from controller.base.mailboxes import REST, Life
 from controller.base.parameters import Flags, Floats, did_you_mean
 from controller.layers.sink import CommandSink, Directory, HeadSink, Player, StatusValue
 
@@ -96,6 +97,12 @@ class Group:
         """The players of all heads as one; None if no head has a player."""
         players = {state.name: state.shows for state in self.members if state.shows is not None}
         return _Players(players) if players else None
+
+    @property
+    def beside(self) -> Life:
+        """Raises ParameterError: every head has its own."""
+        self._refuse()
+        return REST
 
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
         self._each(lambda state: state.set_parameters(indices, values, stamp_ns))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
+from controller.base.mailboxes import Life
 from controller.base.parameters import Flags, Floats, Parameters
 from controller.base.placement import Placement
 from controller.base.stop_latch import StopLatch
@@ -94,6 +95,10 @@ class CommandSink(Protocol):
     @property
     def shows(self) -> Player | None:
         """The player of scripts; None if there is none."""
+
+    @property
+    def beside(self) -> Life:
+        """Breath and pupils, which pictures show beside the parameters."""
 
     def set_parameters(self, indices: Sequence[int], values: Sequence[float], stamp_ns: int) -> None:
         """Hold parameters at values, until released."""

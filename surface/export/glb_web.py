@@ -31,11 +31,12 @@ from surface.export.textures import (
     Picture,
     eye_picture,
     materials,
+    picture_radii,
     png_bytes,
     strand_picture,
     strip_picture,
 )
-from surface.export.web_parts import HALF, HALVES, WebPart, web_parts, worn_web_parts
+from surface.export.web_parts import BREATH, BREATH_MM, HALF, HALVES, WebPart, web_parts, worn_web_parts
 from surface.export.worn import material_of, web_texture, wrap_of
 from surface.head import Head
 from surface.head.model.accessories import Accessory
@@ -116,6 +117,8 @@ class _WebDocument(GlbBuffers):
         self._neck = head.data.neck
         self._lips_open, self._lips = lips_open_at_rest(head), lip_gaps(head)
         self._own = {group.name: list(group.times) for group in head.own_groups}
+        drawn = [one.part for one in parts if one.part.material == "eye" and one.part.texture is None]
+        self._eyes = {part.name: [round(radius, 5) for radius in picture_radii(part)] for part in drawn}
         self._nodes: list[dict[str, Any]] = []
         self._roots = [0]  # and every part that is bound to joints: what is above it would not move it
         self._meshes: list[dict[str, Any]] = []
@@ -137,6 +140,7 @@ class _WebDocument(GlbBuffers):
         return {
             "format": _FORMAT, "half": sorted(names & {name + HALF for name in HALVES}), "own": self._own,
             "lips_open": self._lips_open, "lips": self._lips,
+            "breath": {BREATH: BREATH_MM} if BREATH in names else {}, "eyes": self._eyes,
             "neck": {"pivot": (METRES * np.array(neck.pivot)).tolist()},
         }  # fmt: skip
 

@@ -100,6 +100,12 @@ def eye_picture(part: ExportPart, size: int = 256) -> Picture:
     return encode_srgb(tint * (1.0 - share) + white * share)
 
 
+def picture_radii(part: ExportPart) -> tuple[float, float]:
+    """Return the radii of the iris and of its pupil in :func:`eye_picture`, in widths of the picture."""
+    iris = EYE_RIM * _eye_colours(part)[2]
+    return iris, _PUPIL * iris
+
+
 def _fibres(angle: Floats, t: Floats) -> Floats:
     """Return the brightness of fibres, about 0.5, by the angle about the pupil and how far out they are."""
     random, out = np.random.default_rng(11), np.full(angle.shape, 0.5)

@@ -22,6 +22,8 @@ HALVES = ("eyeBlinkLeft", "eyeBlinkRight", "eyeLookDownLeft", "eyeLookDownRight"
 HALF = "Half"
 """Shapes that turn things move them on arcs, not on the chords of a morph target: NAMEHalf is what lies between arc and
 chord half way, to be shown at the weight 4 w (1 - w)."""
+BREATH, BREATH_MM = "breathRise", 3.0
+"""The shape of a breath that lifts the chest by so many mm, which no parameter shows; see :meth:`Head.live`."""
 _DEEP_MM = 26.0  # depth behind the lips at which a mouth's inside has lost most of its light
 _HAIR_MIDDLE = np.array([0.0, 15.0, 0.0])  # of the hair, mm: locks are shaded as the whole that they make
 _LOWER_LASHES = 0.42
@@ -33,7 +35,7 @@ class WebPart:
     """One part for a page.
 
     part : what it has in common with exports of other kinds, with the vertices that its triangles use, and with
-        ``displacements`` and ``normal_changes`` of further shapes (see :data:`HALF`).
+        ``displacements`` and ``normal_changes`` of further shapes (see :data:`HALF` and :data:`BREATH`).
     colours : (m, 4) float32 linear RGB and alpha: how open to light it lies (skin), or how much hair covers there.
     uv : (m, 2) float32 as glTF has it, v down; None for a part without texture.
     baked : (m, 4) uint8 by name: light that reaches skin at rest, and how glossy and thin it is.
@@ -46,10 +48,12 @@ class WebPart:
 
 
 def web_parts(head: Head, level: str = "full") -> list[WebPart]:
-    """Return all parts of a head, with the triangles of ``level`` where the head has them."""
+    """Return all parts of a head, which is at rest afterwards, with the triangles of ``level`` where it has them."""
+    head.live(0.0, 0.0)
     exported = export_parts(head)
     for name in HALVES:
         _add_half(head, name, exported)
+    _add_breath(head, exported)
     front = max((float(p.vertices[:, 2].max()) for p in exported if p.material == "teeth"), default=0.0)
     found = []
     for part, own in zip(exported, head.parts, strict=True):
@@ -76,6 +80,16 @@ def _add_half(head: Head, name: str, parts: list[ExportPart]) -> None:
         if name in part.displacements:
             part.displacements[name + HALF] = own.vertices - part.vertices - 0.5 * part.displacements[name]
             part.normal_changes[name + HALF] = unit(own.normals) - part.normals - 0.5 * part.normal_changes[name]
+    head.pose(head.values({}))
+
+
+def _add_breath(head: Head, parts: list[ExportPart]) -> None:
+    head.live(BREATH_MM, 0.0)
+    head.pose(head.values({}))
+    for part, own in zip(parts, head.parts, strict=True):
+        part.displacements[BREATH] = own.vertices - part.vertices
+        part.normal_changes[BREATH] = unit(own.normals) - part.normals
+    head.live(0.0, 0.0)
     head.pose(head.values({}))
 
 

@@ -140,6 +140,9 @@ class PupilSettings(Settings):
     fast_hz: Band
     fast: Share
     breath: Share
+    latency_s: Delay
+    narrow_s: Seconds
+    widen_s: Seconds
 
 
 class NodSettings(Settings):

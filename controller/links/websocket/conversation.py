@@ -12,6 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from controller.base.errors import OMOTE_ERRORS, ParameterError
+from controller.base.mailboxes import Life
 from controller.base.parameters import Indices, Parameters
 from controller.base.version import package_version
 from controller.layers.commands import CommandSink
@@ -100,7 +101,7 @@ class Conversation:
         self._due_ns += period * (1 + (now_ns - self._due_ns) // period)
         self._sink = self._state_sink
         state = self._state(self._chosen, now_ns, status=False)
-        return state if wanted.form == "names" else _as_numbers(state)
+        return state if wanted.form == "names" else _as_numbers(state, self._sink.beside)
 
     def _refuse(self, request_id: Any, code: Any, message: str, hint: str = "") -> m.Refused:
         self.refused[code] += 1
@@ -238,11 +239,12 @@ class Conversation:
         return list(kinds[what]())
 
 
-def _as_numbers(state: m.State) -> m.Frame:
+def _as_numbers(state: m.State, life: Life) -> m.Frame:
     measured = None if state.measured is None else list(state.measured.values())
     return m.Frame(
-        time_s=state.time_s, values=list(state.parameters.values()), measured=measured, stopped_by=state.stopped_by
-    )
+        time_s=state.time_s, values=list(state.parameters.values()), measured=measured, stopped_by=state.stopped_by,
+        life=(round(life[0], 3), round(life[1], 4)),
+    )  # fmt: skip
 
 
 def _check_values(parameters: Parameters, given: dict[str, float]) -> tuple[list[int], list[float]]:

@@ -270,13 +270,17 @@ class State(Reply):
 
 
 class Frame(Reply):
-    """The face as numbers, in the order of the subscription's ``parameters``, or else of those in ``hello``."""
+    """The face as numbers, in the order of the subscription's ``parameters``, or else of those in ``hello``. ``life`` :
+    what pictures show beside them: mm by which a breath lifts the chest, and the share by which pupils are wider than
+    the light makes them.
+    """
 
     type: Literal["frame"] = "frame"
     time_s: float
     values: list[float]
     measured: list[float] | None = None
     stopped_by: str | None = None
+    life: tuple[float, float] = (0.0, 0.0)
 
 
 class Overview(Reply):

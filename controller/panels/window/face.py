@@ -17,6 +17,7 @@ from controller.body.panel_state import PanelState
 from controller.face.controls import Controls
 from controller.face.devices import Devices
 from controller.face.face import FrameLog, HeadValues, qualities
+from controller.layers.idle.reflex import LightReflex
 from controller.panels.overlay.fit_error import FitErrorView
 from controller.panels.overlay.overlay_view import OverlayView
 from controller.panels.session.commands import History
@@ -110,6 +111,8 @@ class WindowFace:
             self._panel.sculpt = SculptPanel(self._mouse, self._panel.commands)
             self._panel.saving.editor = self._mouse.find_editor
         self._devices = Devices(Controls(controls, parameters), ask) if controls else None
+        self._steady_pupil = settings.make_theme().pupil
+        self._reflex = None if stage is None else LightReflex(stage.life.pupil)
         self._log = FrameLog()
         self._ended = False
         self._choice = QualityChoice(settings.fps) if settings.quality == "auto" else None
@@ -125,7 +128,7 @@ class WindowFace:
             values = self._values()
             now = time.monotonic_ns()
             self._head.sway.advance(head_angles(values), now / 1e9)
-            self._head.live(*self._values.life)
+            self._head.live(*self._values.life, self._adapted(now / 1e9))
             if began:
                 self._log.add(values, began, now, stamp)  # the frame before has been drawn by now
             began, stamp = now, self._values.stamp_ns
@@ -152,6 +155,12 @@ class WindowFace:
         finally:
             self._panel.playback.close()
 
+    def _adapted(self, now_s: float) -> float:
+        """Return how wide the light makes pupils, of how wide it makes them in the end: they ease to another look's."""
+        if self._reflex is None:
+            return 1.0
+        return self._reflex.follow(self._steady_pupil, now_s) / self._steady_pupil
+
     def _make_wall(self, choice: HeadChoice, heads: Sequence[HeadSource], parameters: Parameters) -> WallView:
         """Show all heads as soon as they are loaded, and one until then."""
         settings, panel = self._settings, self._panel
@@ -175,7 +184,7 @@ class WindowFace:
             if error is not None:
                 self._panel.problems.add(error)
                 return
-            self._settings, self._choice = settings, choice
+            self._settings, self._choice, self._steady_pupil = settings, choice, theme.pupil
             if head is not None:
                 self._take_over(head)
 

@@ -185,14 +185,16 @@ class Head:
         for stitch in self._stitches:
             stitch.close()
 
-    def live(self, rise_mm: float, pupil: float) -> None:
+    def live(self, rise_mm: float, pupil: float, adapted: float = 1.0) -> None:
         """Breathe and change the pupils in pictures from now on, beside the parameters.
 
         rise_mm : by which a breath lifts the chest. pupil : share by which both pupils are wider than the light makes
-        them, within :data:`surface.head.model.sway.WIDEST`; 0 for both is rest.
+        them, within :data:`surface.head.model.sway.WIDEST`; 0 for both is rest. adapted : how wide the light makes them
+        now, of how wide it makes them in the end, above 0; other than 1 while they adapt to another light.
         """
         self.rise_mm = round(rise_mm / STEP_MM) * STEP_MM
-        self.pupil = min(max(pupil, -WIDEST), WIDEST)
+        own = min(max(pupil, -WIDEST), WIDEST)
+        self.pupil = own + (adapted - 1.0) * (1.0 + own)
 
     def read_pose(self, values: Floats) -> Pose:
         """Return parameter values (P,) as a pose, with what sways and the breath where they are now; errors as

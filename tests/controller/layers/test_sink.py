@@ -54,6 +54,7 @@ def test_interfaces_have_the_methods_that_links_use() -> None:
         "overview", "held",
     }  # fmt: skip
     assert methods(HeadSink).keys() == methods(CommandSink).keys()
+    assert isinstance(inspect.getattr_static(CommandSink, "beside"), property)
     assert methods(Player).keys() == {
         "start", "prepare_start", "names", "control", "prepare_control", "tick", "abandon", "status",
     }  # fmt: skip
@@ -105,5 +106,7 @@ def test_a_group_passes_on_every_command_and_asks_for_one_head_at_every_question
     for name, given in QUESTIONS.items():
         with pytest.raises(ParameterError, match="a query needs one of maple, oak, willow"):
             getattr(together, name)(*given)
+    with pytest.raises(ParameterError, match="a query needs one of maple, oak, willow"):
+        _ = together.beside
     together.gaze_head("oak", 7)
     assert [member.calls for member in members] == [[("gaze_head", ("oak", 7))], [], [("gaze_head", ("oak", 7))]]

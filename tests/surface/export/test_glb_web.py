@@ -14,6 +14,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from small_head import all_points, part, small_head
+from textured_head import textured
 
 from surface.base.errors import ExportError
 from surface.export import export_head, glb_web
@@ -21,8 +22,9 @@ from surface.export.glb_buffers import GlbBuffers
 from surface.export.glb_web import lip_gaps, lips_open_at_rest, web_glb
 from surface.export.shapes import export_parts
 from surface.export.textures import eye_picture, png_bytes, strand_picture, strip_picture
-from surface.export.web_parts import MIN_MOVE_MM, web_parts
+from surface.export.web_parts import BREATH, BREATH_MM, MIN_MOVE_MM, web_parts
 from surface.head import Head
+from surface.head.model.data import Neck
 from surface.head.model.own_groups import OwnGroup
 
 TYPES = {5126: "<f4", 5125: "<u4", 5123: "<u2", 5122: "<i2", 5121: "u1", 5120: "i1"}
@@ -107,6 +109,24 @@ def test_an_iris_has_the_colour_that_is_painted_and_else_omotes_blue(head):
     brown = eye_picture(eye)[128, 128 + int(256 * 0.47 * 0.36)].astype(int)
     assert brown[0] > brown[2]
     assert eye_picture(eye)[128, 128].max() < 40, "the pupil"
+
+
+def test_the_document_says_how_eyes_are_drawn_that_have_no_picture_of_their_own(tmp_path, head) -> None:
+    omote = Decoded(web_glb(head)).document["extras"]["omote"]
+    iris, pupil = omote["eyes"]["eye"]
+    picture = eye_picture(export_parts(head)[1]).astype(int).sum(axis=2)
+    row = picture[128, 128:] / picture[128, 128:].max()
+    assert row[round(256 * pupil) - 3] < 0.1 < 0.2 < row[round(256 * pupil) + 6]
+    assert row[round(256 * 0.95 * iris) - 2] < 0.5 < 0.8 < row[round(256 * 1.06 * iris) + 2]
+    assert Decoded(web_glb(textured(tmp_path))).document["extras"]["omote"]["eyes"] == {}
+
+
+def test_a_breath_is_a_target_where_the_head_breathes(head) -> None:
+    assert Decoded(web_glb(head)).document["extras"]["omote"]["breath"] == {}
+    low = Head(small_head(neck=Neck((0.0, 20.0, 0.0), still=-30.0, whole=25.0)))
+    document = Decoded(web_glb(low)).document
+    assert document["extras"]["omote"]["breath"] == {BREATH: BREATH_MM}
+    assert BREATH in document["meshes"][0]["extras"]["targetNames"]
 
 
 def test_pictures_of_hair_are_png_with_alpha():

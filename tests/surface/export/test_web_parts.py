@@ -12,8 +12,9 @@ from small_head import all_points, part, small_head
 from surface.export import web_parts as module
 from surface.export.shapes import ExportPart
 from surface.export.textures import EYE_RIM, materials
-from surface.export.web_parts import MIN_MOVE_MM, MIN_NORMAL, web_parts
+from surface.export.web_parts import BREATH, BREATH_MM, MIN_MOVE_MM, MIN_NORMAL, web_parts
 from surface.head import Head
+from surface.head.model.data import Neck
 
 
 def export_part(vertices: Any, material: str = "skin", **other: Any) -> ExportPart:
@@ -69,6 +70,25 @@ def test_half_shapes_are_what_lies_between_arc_and_chord() -> None:
     whole, half = tooth.part.displacements["jawOpen"], tooth.part.displacements["jawOpenHalf"]
     np.testing.assert_allclose(rest + 0.5 * whole + half, at_half, atol=MIN_MOVE_MM)
     assert 0.1 < np.abs(half).max() < 0.1 * np.abs(whole).max()
+
+
+def test_a_breath_is_a_shape_of_what_it_lifts() -> None:
+    data = small_head(neck=Neck((0.0, 20.0, 0.0), still=-30.0, whole=25.0))
+    head = Head(data)
+    head.live(1.5, 0.1)
+    skin, _, tooth = web_parts(head)
+    assert BREATH not in tooth.part.displacements, "the jaw follows the head"
+    assert (head.rise_mm, head.pupil) == (0.0, 0.0)
+    moved = head.part("a")
+    pose = head.values({})
+    seen = []
+    for rise_mm in (0.0, BREATH_MM):
+        head.live(rise_mm, 0.0)
+        head.pose(pose)
+        seen.append(moved.vertices.copy())
+    lifted = skin.part.displacements[BREATH]
+    assert lifted[:, 1].max() > 0.3 * BREATH_MM
+    np.testing.assert_allclose(lifted, seen[1] - seen[0], atol=MIN_MOVE_MM)
 
 
 def test_coarser_triangles_are_taken_where_the_head_has_them() -> None:

@@ -16,7 +16,7 @@ function isSoftware() {
 }
 
 export class Face {
-  #eyes = []; #parts = []; #worn = []; #values = null; #names = []; #drag = null;
+  #eyes = []; #parts = []; #worn = []; #values = null; #names = []; #drag = null; #life = [0, 0];
 
   constructor(canvas) {
     this.canvas = canvas;
@@ -51,6 +51,8 @@ export class Face {
     this.own = omote.own ?? {};
     this.lips = omote.lips ?? {};
     this.lipsOpen = omote.lips_open ?? true;
+    [this.breath, this.breathMm] = Object.entries(omote.breath ?? {})[0] ?? ["", 1];
+    this.irises = omote.eyes ?? {};
     this.head = new THREE.Object3D();
     this.head.position.fromArray(omote.neck?.pivot ?? [0, 0, 0]);
     shared.pivot.value.copy(this.head.position);
@@ -66,8 +68,9 @@ export class Face {
     const inverse = mesh.skeleton?.boneInverses[0].elements, bends = Boolean(inverse), eye = EYES.indexOf(mesh.name);
     const { map, side, name, alphaTest, transparent } = mesh.material;
     if (map) map.colorSpace = THREE.NoColorSpace;
-    const part = new Part(mesh, bends ? inverse[0] : mesh.scale.x, bends ? inverse.slice(12, 15) : [0, 0, 0]);
-    const drawn = new THREE.Mesh(part.geometry, material(name, { map, side, alphaTest, transparent }, bends));
+    const part = new Part(mesh, bends ? inverse[0] : mesh.scale.x, bends ? inverse.slice(12, 15) : [0, 0, 0], this.breath);
+    const drawn = new THREE.Mesh(part.geometry, material(name, { map, side, alphaTest, transparent }, { bends, breathes: part.breathes }));
+    if (this.irises[mesh.name]) drawn.material.uniforms.iris = { value: this.irises[mesh.name] };
     drawn.frustumCulled = false;
     if (GLOSS[name]) this.#worn.push(part.rest);
     if (bends) this.scene.add(drawn);
@@ -108,6 +111,15 @@ export class Face {
     this.changed = true;
     if (!this.head) return;
     this.#show(names, values);
+  }
+
+  // life: mm by which a breath lifts the chest, and the share by which pupils are wider than the light makes them.
+  live([rise, pupil]) {
+    if (rise === this.#life[0] && pupil === this.#life[1]) return;
+    this.#life = [rise, pupil];
+    this.changed = true;
+    shared.lungs.value = rise / (this.breathMm ?? 1);
+    shared.wider.value = pupil;
   }
 
   #show(names, values) {

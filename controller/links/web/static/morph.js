@@ -20,8 +20,8 @@ function sparse(moves, turns) {
 }
 
 export class Part {
-  // mesh: of the file, in whole steps. step, middle: take them to metres.
-  constructor(mesh, step, middle) {
+  // mesh: of the file, in whole steps. step, middle: take them to metres. breath: the name of the shape that shaders show.
+  constructor(mesh, step, middle, breath) {
     const { geometry } = mesh, { position, normal, skinWeight, skinIndex } = geometry.attributes;
     this.rest = rows(position, step);
     for (let i = 0; i < this.rest.length; i++) this.rest[i] += middle[i % 3];
@@ -35,9 +35,11 @@ export class Part {
       const share = Float32Array.from({ length: position.count }, (_, i) => (skinIndex.getX(i) === 1 ? skinWeight.getX(i) : 0));
       this.geometry.setAttribute("share", new THREE.BufferAttribute(share, 1));
     }
-    this.shapes = Object.entries(mesh.morphTargetDictionary ?? {}).map(([name, i]) => ({
-      name, weight: 0, ...sparse(rows(geometry.morphAttributes.position[i], step), rows(geometry.morphAttributes.normal[i], 1)),
-    }));
+    const moves = (i) => [rows(geometry.morphAttributes.position[i], step), rows(geometry.morphAttributes.normal[i], 1)];
+    const { [breath]: breathing, ...others } = mesh.morphTargetDictionary ?? {};
+    this.breathes = breathing !== undefined;
+    if (this.breathes) ["breath", "breath_normal"].forEach((name, i) => this.geometry.setAttribute(name, new THREE.BufferAttribute(moves(breathing)[i], 3)));
+    this.shapes = Object.entries(others).map(([name, i]) => ({ name, weight: 0, ...sparse(...moves(i)) }));
   }
 
   #moving(name, values) {

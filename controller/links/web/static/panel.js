@@ -88,6 +88,7 @@ function tick() {
   requestAnimationFrame(tick);
   if (latest) {
     face?.pose(robot.names, latest.values);
+    face?.live(latest.life ?? [0, 0]);
     if (!$("sliders").hidden) sliders.show(robot.names, latest.values);
   }
   face?.draw();

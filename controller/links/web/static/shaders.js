@@ -16,6 +16,7 @@ export const shared = {
   key_at_rest: { value: direction(-34, 32) }, rim_at_rest: { value: direction(152, 28) },
   turn: { value: new THREE.Matrix3() }, pivot: vec(0, 0, 0), middle: vec(0, 0.015, 0), eye_axis: vec(0, 0, 1),
   between_lips: { value: 1 },
+  lungs: { value: 0 }, wider: { value: 0 }, iris: { value: [0, 0] },  // the last is each eye's own
 };
 
 const LIGHT = `
@@ -35,10 +36,18 @@ vec3 encode(vec3 linear) {
 const PLACE = `
 attribute float share;
 uniform mat3 turn; uniform vec3 pivot;
+#ifdef BREATHES
+attribute vec3 breath, breath_normal;
+uniform float lungs;
+#endif
 vec3 world, n, v;
 void place() {
   vec3 p = position;
   n = normal;
+  #ifdef BREATHES
+  p += lungs * breath;
+  n += lungs * breath_normal;
+  #endif
   #ifdef BENDS
   p = mix(p, turn * (p - pivot) + pivot, share);
   n = mix(n, turn * n, share);
@@ -163,8 +172,15 @@ void main() {
   place();
   v_uv = uv; v_normal = n; v_view = v; v_world = world;
 }`, `
-uniform sampler2D map; uniform vec3 eye_axis;
+uniform sampler2D map; uniform vec3 eye_axis; uniform vec2 iris; uniform float wider;
 varying vec2 v_uv; varying vec3 v_normal, v_view, v_world;
+// Where the picture has what is seen here: the iris of a pupil that is wider than the picture's is narrower, all of it.
+vec2 seen() {
+  vec2 away = v_uv - 0.5;
+  float r = length(away), pupil = min(iris.y * (1.0 + wider), 0.75 * iris.x);
+  float around = (iris.y + (r - pupil) * (iris.x - iris.y) / (iris.x - pupil)) / max(r, 1e-4);
+  return 0.5 + away * (r < pupil ? iris.y / pupil : r < iris.x ? around : 1.0);
+}
 float windows(vec3 mirrored) {
   vec3 side = normalize(cross(vec3(0.0, 1.0, 0.0), key_direction) + vec3(1e-4, 0.0, 0.0));
   vec2 at = abs(vec2(dot(mirrored, side), dot(mirrored, cross(key_direction, side))));
@@ -173,7 +189,7 @@ float windows(vec3 mirrored) {
 }
 void main() {
   vec3 n = normalize(v_normal), v = normalize(v_view);
-  vec3 albedo = pow(texture2D(map, v_uv).rgb, vec3(2.2));
+  vec3 albedo = pow(texture2D(map, seen()).rgb, vec3(2.2));
   float r = length(v_uv - 0.5) / 0.47;
   vec3 cornea = normalize(n + 0.9 * (n - eye_axis * dot(n, eye_axis)) * (1.0 - smoothstep(0.25, 1.08, r)));
   float shade = 0.35 + 0.65 * smoothstep(0.62, -0.05, n.y - 0.25 * (1.0 - r));
@@ -224,26 +240,28 @@ export const GLOSS = { hair: [0.045, 9], hat: [0.02, 12], glasses: [0.28, 90], j
 const KINDS = { skin: SKIN, strand: STRAND, tress: STRAND, cloth: CLOTH, brow: HAIR, lash: HAIR, eye: EYE, teeth: INNER, gums: INNER, tongue: INNER, mouth: INNER };
 
 // Hair that blends is cut: blended without an order, locks behind would be drawn over those in front.
-function accessory(kind, { map, side, alphaTest, transparent: blends }, bends) {
+function accessory(kind, { map, side, alphaTest, transparent: blends }, moving) {
   const transparent = blends && kind !== "hair", cut = blends ? (transparent ? 0.004 : 0.4) : alphaTest;
   const [vertex, fragment] = ACCESSORY, own = "uniform float soft; uniform vec2 gloss; uniform sampler2D map;";
   return new THREE.ShaderMaterial({
     uniforms: { ...shared, map: { value: map }, soft: { value: kind === "hair" ? 1 : 0 }, gloss: { value: GLOSS[kind] },
       alpha_test: { value: cut }, blended: { value: transparent } },
-    side, transparent, depthWrite: !transparent, defines: { ...(bends ? { BENDS: 1 } : {}), ...(map ? { MAPPED: 1 } : {}) },
+    side, transparent, depthWrite: !transparent, defines: { ...moving, ...(map ? { MAPPED: 1 } : {}) },
     vertexShader: LIGHT + PLACE + own + vertex, fragmentShader: LIGHT + own + fragment,
   });
 }
 
-// The material of a kind of part; what the second argument holds is the file's, `bends` says whether the neck moves it.
-export function material(kind, given, bends) {
-  if (GLOSS[kind]) return accessory(kind, given, bends);
+// The material of a kind of part; what the second argument holds is the file's, `bends` says whether the neck moves it,
+// `breathes` whether breath does.
+export function material(kind, given, { bends, breathes }) {
+  const moving = { ...(bends ? { BENDS: 1 } : {}), ...(breathes ? { BREATHES: 1 } : {}) };
+  if (GLOSS[kind]) return accessory(kind, given, moving);
   const { map, side } = given;
   const [vertex, fragment] = KINDS[kind] ?? CLOTH;
   const blended = vertex === HAIR[0];
   return new THREE.ShaderMaterial({
     uniforms: { ...shared, map: { value: map } }, side, transparent: blended, depthWrite: !blended,
-    defines: { ...(bends ? { BENDS: 1 } : {}), ...(map ? { MAPPED: 1 } : {}) },
+    defines: { ...moving, ...(map ? { MAPPED: 1 } : {}) },
     vertexShader: LIGHT + PLACE + vertex, fragmentShader: LIGHT + fragment,
   });
 }

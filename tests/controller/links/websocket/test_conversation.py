@@ -139,6 +139,23 @@ def test_states_come_at_their_rate_and_missed_ones_are_left_out(client: Client) 
     assert client.talk.due_ns() is None
 
 
+def test_a_frame_has_the_breath_and_pupils_of_the_picture(client: Client) -> None:
+    client.ask("subscribe", rate_hz=100, form="numbers")
+    frame = client.talk.state_due(client.now_ns)
+    assert frame is not None and json.loads(frame.model_dump_json())["life"] == [0.0, 0.0]
+    client.ask("life", amount=1.0)
+    seen = []
+    for _ in range(600):
+        client.settle(0.01)
+        frame = client.talk.state_due(client.now_ns)
+        assert frame is not None and len(frame.values) == len(P)  # type: ignore[union-attr]
+        rise_mm, pupil = frame.life  # type: ignore[union-attr]
+        assert (rise_mm, pupil) == pytest.approx(client.state.beside, abs=1e-3)
+        seen.append((rise_mm, pupil))
+    rises, pupils = zip(*seen, strict=True)
+    assert min(rises) == 0.0 and max(rises) == pytest.approx(3.0, abs=0.01) and max(pupils) - min(pupils) > 0.03
+
+
 def test_only_who_asks_is_answered(client: Client) -> None:
     assert client.send({"type": "set", "parameters": {"jawOpen": 0.1}}) == {}
     assert client.send({"type": "ping"})["type"] == "ok"

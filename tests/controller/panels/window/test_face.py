@@ -24,7 +24,8 @@ from controller.panels.window.panel import Panel, PanelOptions
 from controller.robot.channels import build_table
 from controller.robot.following import FollowingStatistics, MeasuredFace
 from controller.robot.robot import load_robot
-from controller.stage.stage import FaceSettings
+from controller.stage.picture import LightSettings
+from controller.stage.stage import FaceSettings, load_stage
 from controller.vocabulary.vocabulary import Vocabulary
 from drivers.base.bus import BusState
 from surface.head import Head
@@ -259,3 +260,43 @@ def test_the_face_in_a_window_breathes_as_its_values_say(monkeypatch: pytest.Mon
         values = HeadValues(mailbox, PARAMETERS, head.parameters)
         module.WindowFace(head, FaceSettings(kiosk=True), values, lambda request: None).run(lambda: True)
     assert seen == [(0.0, 0.0), (2.0, 0.1)]
+
+
+def test_pupils_ease_to_the_light_of_another_theme(monkeypatch: pytest.MonkeyPatch) -> None:
+    from controller.panels.window import face as module
+
+    head, now_ns = Head(small_head()), 0
+    dark = LightSettings(key=0.02, fill=0.02, ambient=0.02)
+    stage = load_stage("demo", PARAMETERS)
+    settings = FaceSettings(light=dark, kiosk=True)
+    window: module.WindowFace
+    seen: dict[str, np.ndarray] = {}
+
+    def run_window(shown: Head, source: Callable[[], np.ndarray], **_: object) -> None:
+        nonlocal now_ns
+        mailbox.publish(PARAMETERS.neutral(), 0, (0.0, 0.1))
+        for theme in ("skin", "mask", "skin"):
+            if seen:  # the renderer is replaced
+                window._swap(None, settings.model_copy(update={"theme": theme}))
+                window._area.remake.done(None)
+            steady = settings.model_copy(update={"theme": theme}).make_theme().pupil
+            widths = []
+            for _ in range(500):
+                now_ns += 10_000_000
+                source()
+                widths.append(steady * (1.0 + shown.pupil))
+            seen[theme + str(len(seen))] = np.array(widths)
+
+    monkeypatch.setattr(module, "run_window", run_window)
+    monkeypatch.setattr(module.time, "monotonic_ns", lambda: now_ns)
+    with Mailbox.create(len(PARAMETERS)) as mailbox:
+        values = HeadValues(mailbox, PARAMETERS, head.parameters)
+        window = module.WindowFace(head, settings, values, lambda request: None, stage=stage)
+        window.run(lambda: True)
+    wide = 1.1 * settings.make_theme().pupil
+    assert wide > 1.5 and (seen["skin0"] == pytest.approx(wide))
+    narrows, widens = seen["mask1"], seen["skin2"]
+    assert narrows[0] == pytest.approx(wide) and (np.diff(narrows) < 1e-12).all()
+    assert narrows[120] == pytest.approx(1.1, abs=0.02) and narrows[-1] == pytest.approx(1.1)
+    assert widens[0] == pytest.approx(1.1) and (np.diff(widens) > -1e-12).all()
+    assert widens[120] < 0.7 * wide + 0.3 * 1.1 and widens[-1] == pytest.approx(wide)

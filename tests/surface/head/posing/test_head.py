@@ -261,3 +261,13 @@ def test_tilts_of_what_is_no_shape_are_refused(tmp_path):
     file.write_text(file.read_text().replace("jawForward", "jawForwards"))
     with pytest.raises(HeadFileError, match=r"jaw\.tilts\.jawForwards: is no shape"):
         Head.load(tmp_path)
+
+
+def test_pupils_that_still_adapt_to_a_light_may_be_far_from_its_width() -> None:
+    head = Head(small_head())
+    head.live(0.0, 0.1)
+    assert head.pupil == 0.1
+    head.live(0.0, 9.0, 3.0)
+    assert head.pupil == pytest.approx(3.0 * 1.25 - 1.0)
+    head.live(0.0, 0.0, 0.4)
+    assert head.pupil == pytest.approx(-0.6)
