@@ -33,6 +33,7 @@ class FinerMesh:
         self._count = len(mesh.uv)
         self._middles = Middles(self._count)
         self._uv, self._places = mesh.uv, mesh.vertices
+        self._side = np.asarray(mesh.side, np.int64)
 
     @property
     def ends(self) -> Ints:
@@ -43,9 +44,14 @@ class FinerMesh:
         """Put vertices that were made since the last call onto the surface."""
         ends = self.ends[len(self._uv) - self._count :]
         if len(ends):
-            uv = self._uv[ends].mean(axis=1)
-            self._uv = np.concatenate([self._uv, uv])
-            self._places = np.concatenate([self._places, self._surface.evaluate(uv)])
+            uv, side = self._between(ends)
+            self._uv, self._side = np.concatenate([self._uv, uv]), np.concatenate([self._side, side])
+            self._places = np.concatenate([self._places, self._surface.evaluate(uv, side)])
+
+    def _between(self, ends: Ints) -> tuple[Floats, Ints]:
+        """Return the middles (e, 2) between ends (e, 2), and from which side each evaluates the surface: that of both
+        where both lie on the same slit."""
+        return self._uv[ends].mean(axis=1), np.bitwise_and(*self._side[ends].T)
 
     def _behind_new(self, triangles: Ints) -> Ints:
         """Return triangles (t, 3) that were numbered before vertices were added: what seams added comes behind them."""
@@ -59,14 +65,14 @@ class FinerMesh:
         lists = self._lists(surface.n)
         starts = [mesh.cell_start]
         if len(self.ends):
-            basis = surface.basis_matrix(self._uv[self._count :]).tocsr()
+            basis = surface.basis_matrix(self._uv[self._count :], side=self._side[self._count :]).tocsr()
             cuts = np.append(np.arange(0, len(self.ends), 64), len(self.ends))
             starts.append(self._count + cuts[1:])
             lists += [np.unique(basis[a:b].indices).astype(np.int32) for a, b in pairwise(cuts)]
         finer = replace(
             mesh,
             vertices=self._places, normals=np.zeros_like(self._places), triangles=self.triangles.astype(np.int32),
-            uv=self._uv, side=np.concatenate([mesh.side, np.zeros(len(self.ends), np.int64)]),
+            uv=self._uv, side=self._side,
             cell_start=np.concatenate(starts), list_start=np.cumsum([0, *map(len, lists)]),
             list_ids=np.concatenate(lists).astype(np.int32),
         )  # fmt: skip

@@ -46,7 +46,7 @@ class Rounded(FinerMesh):
 
     def _is_far(self, edges: Ints) -> Bools:
         """Return (e,): which edges lie too far from the surface, in their middles."""
-        middle = self._surface.evaluate(self._uv[edges].mean(axis=1))
+        middle = self._surface.evaluate(*self._between(edges))
         away = np.linalg.norm(middle - self._places[edges].mean(axis=1), axis=1)
         found: Bools = away > self._chord_mm
         return found

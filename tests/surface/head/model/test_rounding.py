@@ -107,7 +107,8 @@ def test_clothes_become_rounder_and_stay_dressed() -> None:
 
     def away_mm(mesh: Mapping[str, np.ndarray]) -> float:
         uv = mesh["mesh_uv"]
-        places, _, _ = surface.derivatives(uv, side=mesh["mesh_side"])
+        places, along, _ = surface.derivatives(uv, side=mesh["mesh_side"])
+        assert np.linalg.norm(along, axis=1).min() > 0.1, "vertices of a border are taken from its side"
         return farthest_middle(surface, uv, places, mesh["mesh_triangles"], least=1)
 
     assert away_mm(cloth.mesh) > 4.0 and away_mm(round_.parts[0].mesh) <= 0.1
