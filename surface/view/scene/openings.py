@@ -17,6 +17,7 @@ from surface.head.model.face import face_of
 from surface.mesh.mesh import border_edges
 from surface.view.scene.folds import Fold, fold_over
 from surface.view.scene.parts import ViewPart
+from surface.view.scene.wrinkles import Wrinkles
 
 #: Points of one lid that the eye's shader gets.
 LID_POINTS = 10
@@ -91,7 +92,10 @@ class Openings:
     Attributes
     ----------
     pupil : share by which pupils are now wider than the theme's light makes them.
+    wrinkles : of the head, whose floors are darker; set by who draws it, None without any.
     """
+
+    wrinkles: Wrinkles | None = None
 
     def __init__(
         self, parts: Sequence[ViewPart], read: Read = lambda part, ids: part.vertices[ids],
