@@ -81,8 +81,8 @@ vec3 folded_softly(float over, float deep) {
 #endif
 
 #ifdef WRINKLES
-#define FURROW_MM 0.55          // the shallower, the less a furrow needs to be deep to be dark
-#define FURROW_SOFT_MM 0.15     // how deep it is before it is seen
+#define FURROW_MM 0.70          // the shallower, the less a furrow needs to be deep to be dark
+#define FURROW_SOFT_MM 0.25     // how deep it is before it is seen
 
 uniform float wrinkle_depths[WRINKLES];     // where a vertex has the share 1 of it, mm
 
@@ -92,6 +92,6 @@ vec3 furrowed(vec4 furrow) {
     ivec2 which = ivec2(furrow.xz * 255.0 + 0.5);
     float deep = furrow.y * wrinkle_depths[which.x] + furrow.w * wrinkle_depths[which.y];
     float lost = deep * deep / (deep * deep + FURROW_MM * (deep + FURROW_SOFT_MM));
-    return 1.0 - lost * vec3(0.42, 0.58, 0.62);
+    return 1.0 - lost * vec3(0.47, 0.60, 0.64);
 }
 #endif
