@@ -160,6 +160,10 @@ class Renderer:
     def pose(self, values: np.ndarray) -> None:
         """Move the head to parameter values (P,)."""
         self.evaluator.pose(values)
+        self.take(values)
+
+    def take(self, values: np.ndarray) -> None:
+        """Take the parameter values (P,) by which somebody else has posed the head."""
         self._values = np.array(values, float)
 
     def update(self) -> int:

@@ -107,10 +107,11 @@ class Offscreen:
         self._frame(values, camera)
         return self.read()
 
-    def render_present(self, camera: Camera | None = None) -> np.ndarray:
-        """As :meth:`render`, but of the head as it is, which somebody else has posed. The renderer's evaluator must be
-        "cpu", and it must not draw fewer triangles."""
+    def render_present(self, values: np.ndarray, camera: Camera | None = None) -> np.ndarray:
+        """As :meth:`render`, but of the head as it is, which somebody else has posed with `values` (P,). The renderer's
+        evaluator must be "cpu", and it must not draw fewer triangles."""
         self._make_current()
+        self.renderer.take(values)
         self.renderer.update()
         self.target.paint(self.renderer, camera or self._front)
         return self.read()

@@ -95,14 +95,13 @@ class Openings:
     wrinkles : of the head, whose floors are darker; set by who draws it, None without any.
     """
 
-    wrinkles: Wrinkles | None = None
-
     def __init__(
         self, parts: Sequence[ViewPart], read: Read = lambda part, ids: part.vertices[ids],
         contacts: Sequence[Contact] = (),
     ) -> None:  # fmt: skip
         self._read = read
         self.pupil = 0.0
+        self.wrinkles: Wrinkles | None = None
         self._skin, loops = _face_with_loops(parts, contacts)
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)

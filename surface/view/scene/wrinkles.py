@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from surface.head.model.data import WRINKLE
 from surface.view.scene.parts import ViewHead, ViewPart
 
 if TYPE_CHECKING:
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from surface.head.model.data import Group
     from surface.head.posing.part import HeadPart
 
-PREFIX = "wrinkle"  # with which names of groups begin that sink the skin
 MOST = 64
 """Wrinkles of a head whose floors are darkened: OpenGL 3.1 need not have room for many more uniforms."""
 TOGETHER = 2
@@ -64,7 +64,7 @@ def wrinkles_of(head: ViewHead) -> Wrinkles | None:
     data = getattr(head, "data", None)
     driven = {rule.group for rule in getattr(data, "rules", ())}
     groups = (group.name for part in getattr(data, "parts", ()) if part.follows == "skin" for group in part.groups)
-    names = [name for name in dict.fromkeys(groups) if name.startswith(PREFIX) and name in driven][:MOST]
+    names = [name for name in dict.fromkeys(groups) if name.startswith(WRINKLE) and name in driven][:MOST]
     return Wrinkles(head, names) if names else None  # type: ignore[arg-type]
 
 
