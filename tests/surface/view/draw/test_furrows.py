@@ -69,10 +69,10 @@ def test_folds_of_a_smile_are_darker_and_redder_from_the_front(
 
 def test_every_way_to_draw_agrees(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = [darker(folder, monkeypatch, SMILE | {"browInnerUp": 1.0}, **way)[..., 1] for way in WAYS]  # type: ignore[arg-type]
-    whole = found[0].sum()
-    for less in found[1:]:
-        assert less.sum() == pytest.approx(whole, rel=0.15)
-        assert np.abs(less - found[0]).mean() < 0.25 * np.abs(found[0]).mean()
+    whole, off = found[0].sum(), [np.abs(less - found[0]).sum() / found[0].sum() for less in found]
+    assert [less.sum() for less in found[:-1]] == pytest.approx([whole] * 5, rel=0.1)
+    assert found[-1].sum() == pytest.approx(whole, rel=0.3), "large triangles"
+    assert off[1] < 0.01 and max(off[:-1]) < 0.2 and off[-1] < 0.5
 
 
 @pytest.mark.parametrize("quality", ["full", "fast"])
