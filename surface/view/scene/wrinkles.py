@@ -70,8 +70,8 @@ def wrinkles_of(head: ViewHead) -> Wrinkles | None:
 
 def _sunk(part: HeadPart, groups: Sequence[Group], names: Sequence[str]) -> np.ndarray:
     """(m, w) float32: how deep each whole wrinkle sinks the vertices of a part, mm; 0 where it raises them."""
-    from surface.deform.deformation import Deformation
-    from surface.head.posing.decimated_head import submesh
+    from surface.deform.deformation import Deformation  # compiled: loaded when first used
+    from surface.head.posing.decimated_head import submesh  # compiled: loaded when first used
 
     near = _reached(part, np.concatenate([group.ids for group in groups]))
     skin = Deformation(part.surface, submesh(part.mesh, near))
