@@ -102,6 +102,6 @@ def test_heads_of_a_crowd_have_each_its_own(folder: Path) -> None:
         found = []
         for k in range(2):
             crowd.show(k)
-            found.append(screen.render_present(crowd.values[k], Camera.front()).astype(float))
+            found.append(screen.render_present(Camera.front(), crowd.values[k]).astype(float))
     for one, given in zip(found, ({}, SMILE), strict=True):
         assert np.abs(one - picture(folder, given, evaluator="cpu")).max() <= 2.0
