@@ -81,8 +81,8 @@ vec3 folded_softly(float over, float deep) {
 #endif
 
 #ifdef WRINKLES
-#define FURROW_MM 0.70          // the shallower, the less a furrow needs to be deep to be dark
-#define FURROW_SOFT_MM 0.25     // how deep it is before it is seen
+#define FURROW_MM 0.70          // about how deep a furrow is whose floor lacks half of what the deepest lack
+#define FURROW_SOFT_MM 0.25     // below about this depth hardly anything is lacking, so that its sides are soft
 
 uniform float wrinkle_depths[WRINKLES];     // where a vertex has the share 1 of it, mm
 
