@@ -85,7 +85,7 @@ class _Alike:
         found = []
         for k in range(len(self.crowd)):
             self.crowd.show(k)
-            found.append(self.screen.render_present(self.camera))
+            found.append(self.screen.render_present(self.camera, values[k]))
         return found
 
     def _select(self, rows: Floats) -> Floats:

@@ -16,11 +16,10 @@ from surface.dcp import DCPSurface
 from surface.fit.points.strokes import arc_length, evenly, smooth_line, uv_of
 from surface.fit.source.chart import Chart
 from surface.fit.source.mesh import FitMesh
-from surface.head.model.data import Group, PartData, Rule
+from surface.head.model.data import WRINKLE, Group, PartData, Rule
 from surface.head.model.furrow import Furrow, furrow_knots, furrow_moves
 from surface.head.model.meshes import make_surface
 
-PREFIX = "wrinkle"  # of their groups' names
 DEEPENED = 1.5
 ALONG = 1.8  # distance of the points along a line, in widths of its furrow
 
@@ -72,7 +71,7 @@ def with_deep_wrinkles(part: PartData, points: Floats) -> Floats:
     that are fine enough for their shading."""
     out = points.copy()
     for g in part.groups:
-        if g.name.startswith(PREFIX):
+        if g.name.startswith(WRINKLE):
             out[g.ids] += DEEPENED * g.moves
     return out
 

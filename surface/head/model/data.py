@@ -13,6 +13,7 @@ from surface.head.model.parameters import smoothstep
 from surface.head.model.placement import Placement
 from surface.mesh.domain import Slit
 
+WRINKLE = "wrinkle"  # with which the names of groups begin that sink the skin along lines
 GREATEST_ERROR = "greatest_error"  # in the provenance: how far a fit is from its mesh at most, in which shape and where
 
 

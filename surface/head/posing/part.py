@@ -64,6 +64,7 @@ class HeadPart:
     attributes : static per-vertex arrays (m, k) float32 by name.
     decimated : fewer triangles over the same vertices, by level; see :mod:`surface.head.posing.baked`.
     borders : (k, 2) directed edges that only one triangle of the tessellation has.
+    of_mesh : (m,) int64, which vertex of the tessellation each vertex is, or was copied from.
     surface : the DCP surface at rest. mesh : its tessellation.
     stored : was the tessellation in the head's file? Else it was made when the head was loaded.
     """
@@ -79,7 +80,7 @@ class HeadPart:
         self.normals = np.array(mesh.normals, np.float32)
         self.attributes = dict(attributes)
         self.decimated: dict[str, NDArray[np.int32]] = {}
-        self.borders = border_edges(self.triangles)
+        self.borders, self.of_mesh = border_edges(self.triangles), np.arange(len(self.vertices))
         self.changed: list[tuple[int, int]] = [(0, len(self.vertices))]
         self._turn = Turn(np.eye(3), (0.0, 0.0, 0.0))
         self._share = np.ones(len(self.vertices), np.float32)
@@ -111,7 +112,7 @@ class HeadPart:
     def append(self, like: Ints, triangles: NDArray[np.int32]) -> None:
         """Add copies of vertices ``like (k,)`` after the part's own, and triangles that may use them; the caller moves
         the copies."""
-        for name in ("vertices", "normals", "uv"):
+        for name in ("vertices", "normals", "uv", "of_mesh"):
             array = getattr(self, name)
             setattr(self, name, np.concatenate([array, array[like]]))
         self.attributes = {k: np.concatenate([a, a[like]]) for k, a in self.attributes.items()}

@@ -60,6 +60,8 @@ WORN = ("strand", "cloth")
 FINE = ("freckles", "lips")
 #: Of skin with folds over the eyes, in both qualities.
 FOLD = "fold"
+#: Of skin with wrinkles whose floors are darker, in both qualities.
+FURROW = "furrow"
 #: What a head's skin has whose mesh brought a texture, drawn by pixel in every quality.
 TEXTURE = "texture"
 
@@ -87,16 +89,17 @@ class Material:
 
 
 def programs(
-    ctx: moderngl.Context, quality: str, theme: Theme, *, fine: Collection[str] = (), worn: Collection[str] = ()
-) -> dict[str, moderngl.Program]:
-    """Every program of a quality and a theme, by name; ``fine`` as in :func:`skin_program`, ``worn`` : which of those
-    for what is worn."""
+    ctx: moderngl.Context, quality: str, theme: Theme, *, fine: Collection[str] = (), worn: Collection[str] = (),
+    wrinkles: int = 0,
+) -> dict[str, moderngl.Program]:  # fmt: skip
+    """Every program of a quality and a theme, by name; ``fine`` and ``wrinkles`` as in :func:`skin_program`, ``worn`` :
+    which of those for what is worn."""
     flat = ("flat.frag",)
     eye: dict[str, int | str] = {"LID_POINTS": LID_POINTS}
     if TEXTURE in fine and theme.use_painted:
         eye["TEXTURE"] = 1
     return {name: worn_program(ctx, name, quality) for name in WORN if name in worn} | {
-        "skin": skin_program(ctx, quality, theme, fine=fine),
+        "skin": skin_program(ctx, quality, theme, fine=fine, wrinkles=wrinkles),
         "eye": build(ctx, ("eye.vert",), ("light.glsl", "eye.frag"), defines=eye),
         "inner": build(
             ctx,
@@ -112,10 +115,12 @@ def programs(
 
 
 def skin_program(
-    ctx: moderngl.Context, quality: str, theme: Theme, *, simplified: bool = False, fine: Collection[str] = ()
-) -> moderngl.Program:
+    ctx: moderngl.Context, quality: str, theme: Theme, *, simplified: bool = False, fine: Collection[str] = (),
+    wrinkles: int = 0,
+) -> moderngl.Program:  # fmt: skip
     """The program of skin; `simplified` samples its grain unfiltered, for live pictures drawn in software; `fine` :
-    attributes of parts that quality "full" draws by pixel, of :data:`FINE`; :data:`FOLD`; and :data:`TEXTURE`."""
+    attributes of parts that quality "full" draws by pixel, of :data:`FINE`; :data:`FOLD`; and :data:`TEXTURE`;
+    `wrinkles` : how many darken their floors."""
     defines: dict[str, int | str] = {"INSIDE": _INSIDE}
     scale: dict[str, int | str] = {"DETAIL_PER_RADIAN": f"{_DETAIL_TILES / (2.0 * np.pi):.5f}"}
     textured = TEXTURE in fine and theme.use_painted
@@ -123,6 +128,8 @@ def skin_program(
         defines["TEXTURE"] = 1
     if FOLD in fine and theme.use_painted and not textured:
         defines["FOLD"] = 1
+    if wrinkles and theme.use_painted:
+        defines["WRINKLES"] = wrinkles
     if theme.lit:
         defines |= {"PANELS": 1} | scale
     if quality != "full":
@@ -186,6 +193,8 @@ def _skin_static(part: ViewPart, theme: Theme, openings: Openings) -> Arrays:
         fine["texture_uv"] = part.attributes["texture_uv"]
     if theme.use_painted and openings.folded:
         fine[FOLD] = openings.fold_at(part)
+    if theme.use_painted and openings.wrinkles is not None:
+        fine[FURROW] = openings.wrinkles.at(part)
     if "freckles" in part.attributes:
         fine["freckles"] = part.attributes["freckles"]
     lamp = {"lamp": openings.lip_line(part).astype(np.float32)[:, None]} if theme.lit else {}
@@ -229,6 +238,7 @@ def _skin_uniforms(part: ViewPart, theme: Theme, openings: Openings) -> Mapping[
         "detail_strength": 0.16 * theme.detail,
         **({"lip_tint": openings.lip_tint} if theme.use_painted and openings.lip_tint else {}),
         **({"fold_left": openings.fold_left()} if theme.use_painted and openings.folded else {}),
+        **({"wrinkle_depths": openings.wrinkles.depths} if theme.use_painted and openings.wrinkles is not None else {}),
         **_lamps(theme),
     }
 

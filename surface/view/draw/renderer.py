@@ -22,6 +22,7 @@ from surface.view.scene.framing import framing_of
 from surface.view.scene.openings import Openings
 from surface.view.scene.parts import PartBuffers, ViewHead, ViewPart
 from surface.view.scene.theme import Colour, Light, Theme, find_theme
+from surface.view.scene.wrinkles import wrinkles_of
 
 if TYPE_CHECKING:
     import moderngl
@@ -67,6 +68,7 @@ class Renderer:
         self.evaluator = choose(ctx, head, evaluator)
         self.evaluator.pose(self._values)
         self.openings = Openings(head.parts, lambda part, ids: self.evaluator.positions(part, ids), head.contacts)
+        self.openings.wrinkles = wrinkles_of(head) if self.theme.use_painted else None
         self._fine = ["freckles"] if any("freckles" in part.attributes for part in head.parts) else []
         self._fine += ["lips"] if self.openings.lip_tint else []
         self._fine += [materials.FOLD] if self.openings.folded else []
@@ -74,7 +76,9 @@ class Renderer:
         self._fine += [materials.TEXTURE] if self._texture is not None else []
         used = {materials.material_of(part.material).program for part in head.parts}
         self._worn = [name for name in materials.WORN if name in used]
-        self._programs = materials.programs(ctx, quality, self.theme, fine=self._fine, worn=self._worn)
+        self._programs = materials.programs(
+            ctx, quality, self.theme, fine=self._fine, worn=self._worn, wrinkles=self._wrinkles
+        )
         self._accessories = self._accessory_buffers()
         self._detail = materials.detail_texture(ctx)
         self._background = Rectangles(ctx, self._programs["background"])
@@ -92,6 +96,11 @@ class Renderer:
         #: Whether another renderer draws the same head, too: then what the head says has changed is not all that has.
         self.resend = False
         self._apply_theme()
+
+    @property
+    def _wrinkles(self) -> int:
+        """How many wrinkles darken their floors."""
+        return 0 if self.openings.wrinkles is None else self.openings.wrinkles.count
 
     def _buffers(self, part: ViewPart) -> PartBuffers:
         """Buffers of `part` with the data that its material needs."""
@@ -125,7 +134,7 @@ class Renderer:
             self._texture.simplify()
         self._simplified, old = True, [self._programs[name] for name in ("skin", *self._worn)]
         self._programs["skin"] = materials.skin_program(
-            self.ctx, self.quality, self.theme, simplified=True, fine=self._fine
+            self.ctx, self.quality, self.theme, simplified=True, fine=self._fine, wrinkles=self._wrinkles
         )
         for name in self._worn:
             self._programs[name] = materials.worn_program(self.ctx, name, self.quality, simplified=True)
@@ -151,11 +160,17 @@ class Renderer:
     def pose(self, values: np.ndarray) -> None:
         """Move the head to parameter values (P,)."""
         self.evaluator.pose(values)
+        self.take(values)
+
+    def take(self, values: np.ndarray) -> None:
+        """Take the parameter values (P,) by which somebody else has posed the head."""
         self._values = np.array(values, float)
 
     def update(self) -> int:
         """Bring the buffers up to date with the last :meth:`pose`, once after each. Returns vertices changed."""
         self.openings.refresh()
+        if self.openings.wrinkles is not None:
+            self.openings.wrinkles.show(self._values)
         pupil = float(getattr(self.head, "pupil", 0.0))
         if pupil != self.openings.pupil:
             self.openings.pupil = pupil

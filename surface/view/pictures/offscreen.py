@@ -107,10 +107,13 @@ class Offscreen:
         self._frame(values, camera)
         return self.read()
 
-    def render_present(self, camera: Camera | None = None) -> np.ndarray:
+    def render_present(self, camera: Camera | None = None, values: np.ndarray | None = None) -> np.ndarray:
         """As :meth:`render`, but of the head as it is, which somebody else has posed. The renderer's evaluator must be
-        "cpu", and it must not draw fewer triangles."""
+        "cpu", and it must not draw fewer triangles. `values` : the parameters (P,) that it is posed by, which say how
+        dark the floors of its wrinkles are; those of the last :meth:`render` without them."""
         self._make_current()
+        if values is not None:
+            self.renderer.take(values)
         self.renderer.update()
         self.target.paint(self.renderer, camera or self._front)
         return self.read()

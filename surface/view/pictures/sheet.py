@@ -80,7 +80,7 @@ def crowd_sheet(
     with Offscreen(crowd.head, tile, quality=quality, theme=theme, evaluator="cpu") as screen:
         for k in range(len(crowd)):
             crowd.show(k)
-            pictures.append(screen.render_present(camera))
+            pictures.append(screen.render_present(camera, crowd.values[k]))
             if progress is not None:
                 progress(k + 1, len(crowd))
     return compose(pictures, labels, columns=columns)

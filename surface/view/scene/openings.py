@@ -17,6 +17,7 @@ from surface.head.model.face import face_of
 from surface.mesh.mesh import border_edges
 from surface.view.scene.folds import Fold, fold_over
 from surface.view.scene.parts import ViewPart
+from surface.view.scene.wrinkles import Wrinkles
 
 #: Points of one lid that the eye's shader gets.
 LID_POINTS = 10
@@ -91,6 +92,7 @@ class Openings:
     Attributes
     ----------
     pupil : share by which pupils are now wider than the theme's light makes them.
+    wrinkles : of the head, whose floors are darker; set by who draws it, None without any.
     """
 
     def __init__(
@@ -99,6 +101,7 @@ class Openings:
     ) -> None:  # fmt: skip
         self._read = read
         self.pupil = 0.0
+        self.wrinkles: Wrinkles | None = None
         self._skin, loops = _face_with_loops(parts, contacts)
         self._eyes = {p.name: self._eye(p, loops) for p in parts if p.material == "eye"}
         self._lips = self._find_lips(parts, loops)

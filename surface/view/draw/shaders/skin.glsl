@@ -79,3 +79,19 @@ vec3 folded_softly(float over, float deep) {
     return exp2(-deep * (bell((over + 0.2) * 0.62) * vec3(0.80, 1.10, 1.14) - 0.14 * bell((over - 2.6) * 0.55)));
 }
 #endif
+
+#ifdef WRINKLES
+#define FURROW_MM 0.70          // about how deep a furrow is whose floor lacks half of what the deepest lack
+#define FURROW_SOFT_MM 0.25     // below about this depth hardly anything is lacking, so that its sides are soft
+
+uniform float wrinkle_depths[WRINKLES];     // where a vertex has the share 1 of it, mm
+
+// Light that skin in furrows sends out, of what it would beside them: their floors see less of what is around, and blood
+// colours what comes back. furrow : the number of a wrinkle in 255ths and its share, and those of another.
+vec3 furrowed(vec4 furrow) {
+    ivec2 which = ivec2(furrow.xz * 255.0 + 0.5);
+    float deep = furrow.y * wrinkle_depths[which.x] + furrow.w * wrinkle_depths[which.y];
+    float lost = deep * deep / (deep * deep + FURROW_MM * (deep + FURROW_SOFT_MM));
+    return 1.0 - lost * vec3(0.47, 0.60, 0.64);
+}
+#endif

@@ -25,6 +25,9 @@ in vec2 fold;               // height over the crease of the upper lid, mm; how 
 uniform vec2 fold_left;     // how deep both are now, of what they are at rest
 out vec2 v_fold;
 #endif
+#ifdef WRINKLES
+in vec4 furrow;             // which wrinkles reach the vertex, see furrowed()
+#endif
 #ifdef TEXTURE
 in vec2 texture_uv;         // in the head's own skin texture
 out vec2 v_texture;
@@ -42,6 +45,11 @@ void main() {
     float strength = highlight(normal, v) * albedo_occlusion.a * sun * surface_uv_gloss.z;
     v_diffuse = diffuse(normal, v, albedo, albedo_occlusion.a, sun, reaching(around, rim_at_rest), surface_uv_gloss.w)
         + satin(normal, v, albedo.r, albedo_occlusion.a, surface_uv_gloss.z);
+#ifdef WRINKLES
+    vec3 shade = furrowed(furrow);
+    v_diffuse *= shade;
+    strength *= shade.g;
+#endif
     v_normal_wide = vec4(normal, WIDE * strength);
     v_half_narrow = vec4(normalize(key_direction + v), NARROW * strength);
     v_uv = surface_uv_gloss.xy;

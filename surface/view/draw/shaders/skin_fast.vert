@@ -13,6 +13,9 @@ in vec4 surface_uv_gloss;
 in vec2 fold;                 // as in skin.vert
 uniform vec2 fold_left;
 #endif
+#ifdef WRINKLES
+in vec4 furrow;               // as in skin.vert
+#endif
 #ifdef PANELS
 in float lamp;                // how much of the lamps' light it sends out
 
@@ -42,6 +45,9 @@ void main() {
     lit += shine * key_colour + satin(normal, v, albedo.r, albedo_occlusion.a, surface_uv_gloss.z);
 #ifdef FOLD
     lit *= folded_softly(fold.x, abs(fold.y) * (fold.y < 0.0 ? fold_left.y : fold_left.x));
+#endif
+#ifdef WRINKLES
+    lit *= furrowed(furrow);
 #endif
 #ifdef PANELS
     v_light = lit;
