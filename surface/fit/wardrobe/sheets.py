@@ -30,9 +30,7 @@ _UNEVEN = 0.35  # by how much the length that is roots differs along a hairline:
 _AT_EAR, _EAR_MM = 0.65, 30.0  # by how much narrower a soft edge is over the ears, and how far off them
 _EDGE_BARE = 0.2  # how far below nothing cover is at a frayed edge: single strands there look like threads of a web
 _BACKED = 0.6  # how much less of the innermost sheet frays: skin between the strands of an edge is a dotted line
-_BARED = (
-    0.9  # of the light that sheets above keep from an edge, what reaches it where they fray: else it is dark
-)
+_BARED = 0.9  # of the light that sheets above keep from an edge, what reaches it where they fray: else it is dark
 Drape = Callable[[Floats], Floats]
 """Guides (g, k, 3), hung."""
 Depth = Callable[[Floats], Floats]
