@@ -7,7 +7,7 @@ import pytest
 
 from surface.fit.wardrobe import long as module
 from surface.fit.wardrobe.long import ALONG_PART, BEGINS_MM, FANNED, LAYERS, PART_X, TIPS_Y, long
-from surface.fit.wardrobe.skin import Skin
+from surface.fit.wardrobe.skin import CENTRE, Skin
 from surface.fit.wardrobe.styles import Style
 from tests.surface.fit.wardrobe.invariants import check_patches, heights, points_of
 
@@ -51,9 +51,10 @@ def test_the_parting_goes_from_the_line_backwards_and_fans_out_at_its_end(skin: 
 
 def test_the_parting_wanders_a_little(skin: Skin, style: Style) -> None:
     """One drawn with a ruler is no person's."""
-    x, _, z = module._parting(skin, style.hairline)[:ALONG_PART].T
-    aside = x - np.polyval(np.polyfit(z, x, 2), z)
-    assert 0.3 < np.ptp(aside) < 4.0
+    x, y, _ = module._parting(skin, style.hairline)[:ALONG_PART].T
+    aside = x / (y - CENTRE[1])  # as seen from the skull's middle: a straight one has the same everywhere
+    aside = aside / aside.mean() * PART_X - PART_X
+    assert 0.8 < np.ptp(aside) < 4.0
     assert (np.diff(np.sign(aside)) != 0).sum() >= 3
 
 
