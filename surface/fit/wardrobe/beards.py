@@ -29,13 +29,10 @@ _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips i
 _LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
 _FIELD_MM = -8.0, 12.0  # inside the beard's lines: where stubble begins, and where it is dense
 _DENSER = 1.28  # hair over the lip, which is too short to lie over what is beside it
-_GROWS, _TIPS, _THIN = (
-    0.5,
-    0.34,
-    0.32,
-)  # shares over which it grows in from above, ends below, and thins out to its ends
-_LIP_UNEVEN = 0.06  # by how much the first and the last of these differ from lock to lock
-_PHILTRUM = 0.3, 2.8  # how much of it the hollow below the nose shows, and over how many mm from the middle
+_GROWS, _TIPS = 0.5, 0.34  # of the way from nose to lip, over which it grows in from above and ends below
+_THIN = 0.27  # of its width, over which it thins out to either end
+_LIP_UNEVEN = 0.06  # by how much the first two of these differ from lock to lock
+_PHILTRUM = 0.26, 4.2  # how much of it the hollow below the nose shows, and over how many mm from the middle
 _WIDE_MM = 11.0  # inside its lines, where a beard is dense
 _LIP_DEG = 26.0  # from the middle, where it ends: at the corners of the mouth
 _LIP_MM = 2.6  # the same over the lip
