@@ -18,19 +18,26 @@ _ANGLES = np.array([0.0, 8.0, 15.0, 20.0, 24.0, 32.0, 45.0, 60.0, 75.0, 87.0, 95
 _UPPER = np.array([-14.0, -12.5, -13.6, -18.0, -22.5, -24.5, -26.0, -23.0, -8.0, 12.0, 14.0])
 _LOWER = np.array([-94.0, -94.0, -93.0, -92.0, -90.0, -88.0, -84.0, -76.0, -60.0, -32.0, -4.0])
 _BELOW = np.array([-42.0, -42.0, -41.0, -34.0, -25.0, -23.0, -26.0, -23.0, -8.0, 12.0, 14.0])
-_LIP = np.array([-25.4, -25.4, -26.0, -28.0, -29.6])  # lower line of the moustache, at the first five angles: it ends
-# level with the corners of the mouth, since one that hangs over them makes every face look sad
+#: The same of the moustache, at its own angles: roots from the nose outwards, tips along the border of the upper lip,
+#: and none lower than the corners of the mouth, since a moustache that hangs over them makes every face look sad.
+_LIP_ANGLES = np.array([0.0, 4.0, 8.0, 15.0, 20.0, 24.0, 29.0])
+_LIP_UPPER = np.array([-14.2, -13.6, -12.8, -14.2, -17.5, -21.5, -26.0])
+_LIP = np.array([-25.4, -25.2, -25.6, -27.2, -29.4, -31.0, -32.4])
 _EDGE_DEG = 90.0
 _LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.2])
 _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips is theirs
 _LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
 _FIELD_MM = -8.0, 12.0  # inside the beard's lines: where stubble begins, and where it is dense
-_DENSER = 1.3  # hair over the lip, which is too short to lie over what is beside it
+_DENSER = 1.28  # hair over the lip, which is too short to lie over what is beside it
+_GROWS, _TIPS = 0.5, 0.34  # of the way from nose to lip, over which it grows in from above and ends below
+_THIN = 0.27  # of its width, over which it thins out to either end
+_LIP_UNEVEN = 0.06  # by how much the first two of these differ from lock to lock
+_PHILTRUM = 0.26, 4.2  # how much of it the hollow below the nose shows, and over how many mm from the middle
 _WIDE_MM = 11.0  # inside its lines, where a beard is dense
-_LIP_DEG = 26.0  # from the middle, where it ends: just past the corners of the mouth
+_LIP_DEG = 26.0  # from the middle, where it ends: at the corners of the mouth
 _LIP_MM = 2.6  # the same over the lip
 _SHADED = 0.14  # by how much locks differ in brightness
-_FAN = 0.3  # by how much narrower the moustache's roots lie than its tips: hairs lie outwards from the middle
+_FAN = 0.42  # by how much narrower the moustache's roots lie than its tips: hairs lie outwards from the middle
 _BEHIND = 0.8  # mm inside the beard's end at the ear for a degree: there it thins out slowly
 _UNEVEN_MM, _UNEVEN_DEG = 1.6, 3.1  # by how much the line at which hairs begin wanders, and how fast
 _SIDE_DEG, _SIDE = (45.0, 86.0), 0.85  # between which it gets shorter towards the ear, and by which share
@@ -77,8 +84,8 @@ def garment(skin: Skin, beard: Beard) -> list[Patches]:
     wide = _EDGE_DEG * (1.0 - 2.0 * greville(31, 2))  # so that the outside is outside
     main = _grid(skin, wide, np.interp(np.abs(wide), _ANGLES, _BELOW), np.interp(np.abs(wide), _ANGLES, _LOWER), 11)
     narrow = _LIP_DEG * (1.0 - 2.0 * greville(13, 2))
-    top = np.interp((1.0 - _FAN) * np.abs(narrow), _ANGLES, _UPPER)
-    lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _ANGLES[:5], _LIP), 5, _FAN)
+    top = np.interp((1.0 - _FAN) * np.abs(narrow), _LIP_ANGLES, _LIP_UPPER)
+    lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _LIP_ANGLES, _LIP), 5, _FAN)
     out = []
     for k, (share, cover) in enumerate(beard.shells):
         out.append(_shell(skin, beard, main, (43, 13), (29, 10), share, cover, k, _WIDE_MM, over_lip=False))
@@ -134,16 +141,15 @@ def _shell(
     gu, gv = grid
     s, t = np.linspace(0.0, 1.0, gu), np.linspace(0.0, 1.0, gv)
     places = _between(ground, *(np.interp(at, greville(n, 2), np.arange(n)) for at, n in ((s, nu), (t, nv))))
-    reached = _reached(places.reshape(-1, 3), full_mm, share).reshape(gu, gv)
     width = np.linalg.norm(np.diff(places.mean(axis=1), axis=0), axis=1).sum()
     length = np.linalg.norm(np.diff(places, axis=1), axis=2).sum(axis=1).mean()
     s, t = np.meshgrid(s, t, indexing="ij")
     openness = 0.72 + 0.28 * share + 0.0 * s
     if over_lip:
         openness = 0.9 * openness
-        reached = reached * step(np.minimum(s, 1.0 - s), 0.0, 0.2) * (1.0 - 0.9 * step(t, 0.6, 1.0))
+        reached = _reached_over_lip(places[..., 0], s, t, layer)
     else:
-        reached = reached * step(t, 0.0, 0.1)
+        reached = _reached(places.reshape(-1, 3), full_mm, share).reshape(gu, gv) * step(t, 0.0, 0.1)
     along = (t * length - _ROOTS_MM * _SHORTER * np.exp(-t * length / _ROOTS_MM)) / beard.grain
     strands = np.stack(
         [s * width * _HAIRS + 0.31 * layer, along, cover * reached - BARE * (1.0 - reached), openness], axis=-1
@@ -159,13 +165,19 @@ def _shell(
 
 def _reached(places: Floats, full_mm: float, share: float) -> Floats:
     """(n,) how much of a shell's hairs grow at places on the skin (n, 3): fewer towards the beard's lines, and the
-    longer they are, the later; over the lip fewer towards the corners of the mouth and below the nose's middle."""
-    deep = inside(places) - _LATER * full_mm * share + min(1.0, full_mm / _WIDE_MM) * _wandering(places)
-    out = step(deep, -0.3 * full_mm, 1.2 * full_mm)
-    x, y, z = places.T
-    lip = step(y, -36.0, -30.0) * step(z, 70.0, 80.0)
-    thinner = 0.12 * step(np.abs(x), 18.0, 31.0) + 0.2 * np.exp(-((x / 2.0) ** 2))
-    return np.asarray(out * (1.0 - lip * thinner))
+    longer they are, the later."""
+    deep = inside(places) - _LATER * full_mm * share + _wandering(places)
+    return step(deep, -0.3 * full_mm, 1.2 * full_mm)
+
+
+def _reached_over_lip(x: Floats, s: Floats, t: Floats, layer: int) -> Floats:
+    """(gu, gv) the same over the lip, at shares s of its width and t of the way from nose to lip: it grows in and ends
+    softly, thins out towards the corners of the mouth and shows the hollow below the nose."""
+    random = np.random.default_rng(17 + layer)
+    begins, ends = (_LIP_UNEVEN * random.uniform(-1.0, 1.0, (len(s), 1)) for _ in range(2))
+    grown = step(t + begins, -0.05, _GROWS) * (1.0 - step(t + ends, 1.0 - _TIPS, 1.0))
+    thinner = step(np.minimum(s, 1.0 - s), 0.0, _THIN) * (1.0 - _PHILTRUM[0] * np.exp(-((x / _PHILTRUM[1]) ** 2)))
+    return np.asarray(grown * thinner)
 
 
 def _wandering(places: Floats) -> Floats:

@@ -17,13 +17,13 @@ _OUT = unit(np.array([0.0, 0.42, -0.91]))  # where it points
 _RADII = np.array([29.0, 26.0, 22.0])  # half its width, its height, and along where it points
 GUIDES = 73
 LAYERS = (
-    Layer(1.06, 0.50, 1.0, 4.0, 0.8, 26.0, edge_mm=8.0), Layer(1.0, 0.78, 0.92, 4.0, 1.1, 20.0, edge_mm=9.0),
-    Layer(0.90, 1.8, 0.80, 4.0, 2.1, 13.0, edge_mm=9.0),
+    Layer(1.06, 0.50, 1.0, 4.0, 0.8, 26.0, edge_mm=10.0), Layer(1.0, 0.78, 0.92, 4.0, 1.1, 20.0, edge_mm=12.0),
+    Layer(0.90, 1.8, 0.80, 4.0, 2.1, 13.0, edge_mm=14.0),
 )  # fmt: skip
 # The inner one so dense that it is closed up to its tip: nothing lies below it
 BUN_LAYERS = (Layer(1.04, 0.5, 1.0, 6.0), Layer(1.0, 7.6, 0.82, 0.2))
 UNDER_MM = 8.0  # from the middle of the bun's base: there strands of the skull end, well below the coil
-FADE_MM = -7.0, 3.0  # short hairs that the tie does not reach: without them the line is cut as with a saw
+FADE_MM = -7.0, 9.0  # short hairs that the tie does not reach: without them the line is cut as with a saw
 EDGE_MM = 2.5  # outside the line, where the first hairs grow
 STRAYS, COIL_STRAYS = Strays(44, 4.5, (0.0, 0.85)), Strays(12, 5.0, (0.0, 0.9))
 _UNEVEN = 0.01  # rad from the crown, by which hair begins sooner or later: along an even line it would be a cap

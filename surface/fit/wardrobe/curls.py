@@ -10,13 +10,13 @@ from surface.fit.wardrobe.hairline import Hairline
 from surface.fit.wardrobe.patches import Patches
 from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import BARE, Style, cap, step
+from surface.fit.wardrobe.styles import Style, cap, step, thinned
 
 _CURL = 1.0 / 30.0  # tiles of the noise for a mm: curls of a few mm
 _FLAT_MM = 6.0  # inside the line, over which curls lie on the skin and begin to cover it
 _ROUND_MM = 40.0  # further inside, over which a cloud of curls grows round
-_FADE_MM = -3.0, 17.0  # black hair darkens skin at once: a line that is soft to the eye is wide
-_UNEVEN, _SHADED = 0.12, 0.10  # of the width over which curls run out, and of their brightness, by which they differ
+_FADE_MM = -4.0, 20.0  # black hair darkens skin at once: a line that is soft to the eye is wide
+_UNEVEN, _SHADED = 0.05, 0.10  # of the width over which curls run out, and of their brightness, by which they differ
 _STEADY = 0.2  # of the shader strand.frag, which stretches the noise along strands by its reciprocal
 
 
@@ -28,7 +28,7 @@ def crop(skin: Skin) -> Style:
         return np.asarray(0.6 + (3.2 + 2.4 * step(at[:, 1], 60.0, 125.0)) * step(line.inside(at), -3.0, 22.0))
 
     layers = (1.0, 0.52), (0.72, 0.80), (0.45, 1.4)
-    return Style(_shells(skin, line, thickness, layers, short_mm=0.5, edge_mm=15.0), line, fade=_FADE_MM)
+    return Style(_shells(skin, line, thickness, layers, short_mm=0.5, edge_mm=17.0, dense=0.3), line, fade=_FADE_MM)
 
 
 def afro(skin: Skin) -> Style:
@@ -41,7 +41,7 @@ def afro(skin: Skin) -> Style:
         return np.asarray(0.8 + full * within * (2.0 - within))  # rises at once, at half a right angle: no brim
 
     layers = (1.0, 0.42), (0.92, 0.72), (0.66, 1.4)
-    return Style(_shells(skin, line, thickness, layers, short_mm=0.5, edge_mm=8.0, dense=0.45), line, fade=_FADE_MM)
+    return Style(_shells(skin, line, thickness, layers, short_mm=0.5, edge_mm=13.0, dense=0.45), line, fade=_FADE_MM)
 
 
 def _shells(
@@ -62,9 +62,9 @@ def _shells(
         wanders = _UNEVEN * np.abs(random.standard_normal((len(places), 1)))
         wanders[-1] = wanders[0]
         inside = line.inside(places.reshape(-1, 3)).reshape(own.grid) / edge_mm
-        gone = 1.0 - step(inside - wanders * (inside < 1.5), 0.0, 1.0)
-        gone[:, -1] = 1.0
-        strands[..., 2] = cover - (cover + BARE) * gone
+        inside = inside - wanders * (inside < 1.5)
+        inside[:, -1] = -1.0
+        strands[..., 2] = thinned(np.full_like(inside, cover), inside)
         shade = own.shade * (1.0 + _SHADED * random.standard_normal(own.shade.shape).clip(-2.0, 2.0))
         shade[:, -1] = shade[:, 0]
         out.append(Patches(own.points, own.degrees, own.grid, own.fast, strands, own.tint, shade, own.sway))

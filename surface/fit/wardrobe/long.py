@@ -14,6 +14,8 @@ from surface.fit.wardrobe.strays import Strays, strays
 from surface.fit.wardrobe.styles import Style, cap, step, tangent
 
 PART_X = 14.0  # of the parting, mm
+WANDERS_MM = (0.7, 61.0, 0.6), (0.25, 27.0, 2.1)  # how far it wanders to either side, over which length, begun where
+BEGINS_MM = 8.5  # inside the hairline, where the parting does and with it the sheets: before them lies the under-cap
 AT_PARTING = 0.22  # share of the hair's thickness at the parting: roots lie in a shallow valley, not beside a slot
 APART_MM = 0.05  # of either side's roots from the parting's middle: more would be a slot with the cap's edge in it
 ALONG_PART, FANNED = 25, 12  # guides that begin along the parting, and at its end behind
@@ -29,7 +31,7 @@ _WAVE_MM, _WAVE_DEEP_MM = 88.0, 3.4  # how long waves of hair that hangs are, an
 _TURNS_IN_MM = 30.0, 9.0  # of its end, that turns in, and by how much
 RAGGED_MM = 1.5  # by how much locks differ in length: more is a hem torn, not cut
 STRAYS = Strays(15, 5.0, (0.02, 0.97))  # of either side
-FRAYED = 0.05, 0.0  # of the width, at the face and behind
+FRAYED = 0.09, 0.0  # of the width, at the face and behind
 LAYERS = (
     Layer(1.07, 0.46, 1.0, 56.0, 0.1), Layer(1.0, 0.70, 0.90, 42.0, 0.1), Layer(0.84, 1.6, 0.72, 26.0),
 )  # fmt: skip
@@ -45,7 +47,9 @@ def long(skin: Skin) -> Style:
     sides = [_curtain(skin, line, side) for side in (1.0, -1.0)]
     hanging = _inner_last([patch for patches in sides for patch in patches])
     stray = tuple(strays(patches[0], STRAYS, CENTRE, seed=28 + k) for k, patches in enumerate(sides))
-    return Style([cap(skin, line, thickness, share=0.5, openness=0.7)], line, tuple(hanging), strays=stray)
+    return Style(
+        [cap(skin, line, thickness, share=0.5, short_mm=0.5, openness=0.7)], line, tuple(hanging), strays=stray
+    )
 
 
 def _full(line: Hairline, at: Floats) -> Floats:
@@ -155,9 +159,10 @@ def _curtain(skin: Skin, line: Hairline, side: float) -> list[Patches]:
 def _parting(skin: Skin, line: Hairline) -> Floats:
     """(ALONG_PART + FANNED, 3) places on the skin along the parting, from the line backwards, the last one again and
     again."""
-    z = np.linspace(84.0, -62.0, 400)
-    toward = unit(np.column_stack([np.full(len(z), PART_X), np.full(len(z), 95.0), z]))
+    z = np.linspace(125.0, -62.0, 400)
+    wander = sum(far * np.sin(2.0 * np.pi * z / wave + begun) for far, wave, begun in WANDERS_MM)
+    toward = unit(np.column_stack([PART_X + wander, np.full(len(z), 95.0), z]))
     every = CENTRE + toward * skin.reach(toward)[:, None]
-    every = every[line.inside(every) > 1.0]
+    every = every[line.inside(every) > BEGINS_MM]
     at = every[np.rint(np.linspace(0, len(every) - 1, ALONG_PART)).astype(int)]
     return np.concatenate([at, np.repeat(at[-1:], FANNED, axis=0)])

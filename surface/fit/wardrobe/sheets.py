@@ -18,7 +18,7 @@ from surface.fit.wardrobe.guides import Flow, Thickness, grow, resampled
 from surface.fit.wardrobe.patches import Patches, greville, knots
 from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.skin import Skin, unit
-from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, denser, step
+from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, denser, step, thinned
 
 _CLUMPS_MM = 13.0  # how wide clumps of locks are, which are brighter or darker and end sooner or later than others
 _CLUMPED = 0.4  # by how much the length differs, over which strands of clumps end one after the other
@@ -30,6 +30,8 @@ _UNEVEN = 0.35  # by how much the length that is roots differs along a hairline:
 _AT_EAR, _EAR_MM = 0.65, 30.0  # by how much narrower a soft edge is over the ears, and how far off them
 _EDGE_BARE = 0.2  # how far below nothing cover is at a frayed edge: single strands there look like threads of a web
 _BACKED = 0.6  # how much less of the innermost sheet frays: skin between the strands of an edge is a dotted line
+_LINE_WANDERS_MM = 0.9  # by which hair grows in sooner or later along a soft line: more are tufts
+_BARED = 0.9  # of the light that sheets above keep from an edge, what reaches it where they fray: else it is dark
 Drape = Callable[[Floats], Floats]
 """Guides (g, k, 3), hung."""
 Depth = Callable[[Floats], Floats]
@@ -126,13 +128,13 @@ def _thinned(made: Patches, inside: Depth, edge_mm: float, random: np.random.Gen
     """A sheet whose cover falls to nothing over the last ``edge_mm`` before a line."""
     at = surface_at(made.points[0], made.degrees, [np.linspace(0.0, 1.0, n) for n in made.grid])
     left = inside(at.reshape(-1, 3)).reshape(made.grid)
-    wanders = 0.16 * edge_mm * random.standard_normal((made.grid[0], 1))
+    wanders = _LINE_WANDERS_MM * random.standard_normal((made.grid[0], 1))
     wanders[-1] = wanders[0]
     x, _, z = np.moveaxis(at, 2, 0)
     at_ear = np.exp(-((z / _EAR_MM) ** 2)) * step(np.abs(x), 50.0, 70.0)
-    gone = 1.0 - step((left + wanders) / (1.0 - _AT_EAR * at_ear), 0.0, edge_mm)
+    share = (left + wanders) / (1.0 - _AT_EAR * at_ear) / edge_mm
     strands = made.strands.copy()
-    strands[0, ..., 2] -= (strands[0, ..., 2] + BARE) * gone
+    strands[0, ..., 2] = thinned(strands[0, ..., 2], share)
     return replace(made, strands=strands)
 
 
@@ -221,13 +223,16 @@ def sheet(
     longer = 1.0 - 0.3 * locks.clip(-1, 1) - _CLUMPED * clumps.clip(-1, 1)
     fray = np.minimum(layer.fray_mm * longer / own, 0.9)
     cover = layer.cover * (1.0 + 0.10 * locks) - (layer.cover + BARE) * np.clip((t - 1.0 + fray) / fray, 0.0, 1.0)
+    edge = np.zeros_like(u)
     for width, away in zip(frayed, (u, 1.0 - u), strict=True):
         if width > 0.0:
-            cover = cover - (layer.cover + _EDGE_BARE) * (1.0 - np.clip(away / width, 0.0, 1.0))
+            edge = np.maximum(edge, 1.0 - np.clip(away / width, 0.0, 1.0))
+    cover = cover - (layer.cover + _EDGE_BARE) * edge
     if layer.roots > 0.0:
         uneven = 1.0 + _UNEVEN * _waves(gu, random, closed)[:, None]
         cover = cover - layer.roots * (1.0 - step(t * own / uneven, 0.0, layer.roots_mm))
     opened = layer.openness * (1.0 - _ROOTED[0] * (1.0 - step(t, 0.0, _ROOTED[1]))) * (1.0 + 0.05 * locks)
+    opened = opened + _BARED * np.sqrt(edge) * (1.0 - opened)
     ends = np.exp(-(1.0 - t) * own / max(layer.cropped_mm, 1e-9))
     opened = opened * (1.0 - _CLOSER * ends) if layer.cropped_mm > 0.0 else opened
     along = start[1] + ALONG * (float(np.median(lengths)) * t + _CROPPED * layer.cropped_mm * ends)

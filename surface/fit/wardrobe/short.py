@@ -18,6 +18,7 @@ CROWN = np.array([12.0, 132.0, -42.0])
 RING_RAD = 0.05  # from the crown, seen from the skull's middle: where guides leave it
 GUIDES = 73
 FADE_MM = -4.0, 15.0  # of skin below a fringe, which is no dark patch where locks part at the temple
+SWEPT_FADE_MM = -5.0, 17.0  # of skin below hair that is swept back, which grows denser over so wide a border
 STRAYS = Strays(36, 5.0, (0.04, 0.9))
 RAGGED_MM = 0.7  # by how much the line differs at which hair that is swept back begins
 CLOSE_MM = 0.9, 0.4  # over the skin, where hair ends at the line: at the sides and over the forehead
@@ -29,9 +30,9 @@ FRINGED = (
     Layer(0.88, 1.8, 0.70, 17.0, edge_mm=11.0),
 )  # fmt: skip
 SWEPT = (
-    Layer(1.10, 0.46, 1.0, 24.0, cropped_mm=7.0, edge_mm=7.0),
-    Layer(1.0, 0.72, 0.90, 18.0, cropped_mm=7.0, edge_mm=10.0),
-    Layer(0.88, 1.8, 0.76, 14.0, cropped_mm=7.0, edge_mm=14.0),
+    Layer(1.10, 0.46, 1.0, 8.0, cropped_mm=7.0, edge_mm=12.0),
+    Layer(1.0, 0.72, 0.90, 6.0, cropped_mm=7.0, edge_mm=16.0),
+    Layer(0.88, 1.8, 0.76, 4.0, cropped_mm=7.0, edge_mm=20.0),
 )  # fmt: skip
 
 
@@ -124,7 +125,8 @@ def _swept_back(skin: Skin, sweep: Sweep, seed: int) -> Style:
         )  # fmt: skip
 
     made = sheets(skin, _spread(skin, comb), sweep.layers, WEAVE, seed=seed, closed=True)
-    return Style(made, line, strays=(strays(made[0], STRAYS, CENTRE, seed=seed + 1),))
+    stray = strays(made[0], STRAYS, CENTRE, seed=seed + 1)
+    return Style(made, line, fade=SWEPT_FADE_MM, strays=(stray,))
 
 
 def _spread(skin: Skin, comb: Callable[[Floats], Comb]) -> Comb:

@@ -41,6 +41,16 @@ def step(x: Floats, low: float, high: float) -> Floats:
     return np.asarray(t * t * (3.0 - 2.0 * t))
 
 
+def thinned(cover: Floats, left: Floats) -> Floats:
+    """Cover of hair, less where it ends: ``left`` is the share of the way from where nothing grows to where all does.
+
+    As strands' heights lie between 0 and 1, the eye sees cover between these alone: that of a closed sheet, which is
+    far above 1, would fall through them all at once, in a line.
+    """
+    most = np.where(left < 0.0, left, left + (left >= 1.0) * 1e3)
+    return np.asarray(np.maximum(np.minimum(cover, most), -BARE))
+
+
 def denser(t: Floats, dense: float) -> Floats:
     """Shares of a way, 0..1, at t, 0..1: by ``dense`` closer together at the end, or where it is negative at the
     beginning."""

@@ -23,6 +23,8 @@ SHADED = 0.6  # of the light that falls on skin between roots, what hair keeps f
 CURLED_MM = (
     40.0  # of strands for a tile of their texture: where it is shorter, strands turn, and none has one direction
 )
+ENDS_MM = 16.0  # of a parting, over which it is closed by hair at either end
+NOT_BARE_MM = 4.0  # from the parting, where strand.frag shows no skin
 THROUGH = 0.8  # of the skin between roots of hair that is light, which lets light through and shows less on it
 
 
@@ -65,7 +67,8 @@ def _show_parting(part: HeadPart, garment: Garment, others: Iterable[HeadPart]) 
     along, patch = part.attributes["strands"][:, 1], np.floor(np.asarray(part.uv)[:, 0] / 2.0).astype(int)
     first = np.full(patch.max(initial=0) + 1, np.inf)
     np.minimum.at(first, patch, along)
-    part.attributes["roots"] = np.asarray(ALONG_MM * (along - first[patch])[:, None], np.float32)
+    roots = ALONG_MM * (along - first[patch]) + NOT_BARE_MM * _parting_closed(part, patch)
+    part.attributes["roots"] = np.asarray(roots[:, None], np.float32)
     skins = [
         other.attributes["albedo"][cover[:, 0] > COVERED]
         for other in others
@@ -76,6 +79,24 @@ def _show_parting(part: HeadPart, garment: Garment, others: Iterable[HeadPart]) 
     if len(under):
         ratio = under.mean(axis=0) / np.maximum(garment.worn.colour, 1e-3)
         part.attributes["scalp"] = np.tile(ratio.astype(np.float32), (len(along), 1))
+
+
+def _parting_closed(part: HeadPart, patch: NDArray[np.int_]) -> Floats:
+    """(m,) how closed the parting is at the strand of each vertex, 0..1: hair closes over it towards either end.
+
+    patch : (m,) which sheet each vertex belongs to. Its rows run along the parting, its columns away from it.
+    """
+    u, v = np.asarray(part.uv, float).T
+    closed = np.zeros(len(u))
+    for each in np.unique(patch):
+        own = np.flatnonzero(patch == each)
+        roots = own[v[own] == v[own].min()]
+        roots = roots[np.argsort(u[roots])]
+        steps = np.linalg.norm(np.diff(part.vertices[roots].astype(float), axis=0), axis=1)
+        along = np.concatenate([[0.0], np.cumsum(steps)])
+        left = np.minimum(along, along[-1] - along) / ENDS_MM  # of the way to the nearer end
+        closed[own] = np.interp(u[own], u[roots], 1.0 - np.clip(left, 0.0, 1.0))
+    return closed
 
 
 def _directions(part: HeadPart) -> Floats32:

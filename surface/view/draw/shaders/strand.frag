@@ -1,8 +1,8 @@
 // Strands: locks part and thin out where their cover falls below a strand's height.
 #define SOFT vec2(0.9, 0.3)  // of strands' heights, over which each fades: few, as at a hairline, and many together
 #define STEADY 0.2  // a strand keeps its height along its length, so that no piece of it is left by itself
-#define PARTING vec4(-0.3, 1.9, 3.6, 0.5)  // mm from the roots: scalp, hair; how unevenly strands begin; most of the scalp seen
-#define SCALP vec3(0.66, 0.56, 0.48)  // of skin between hair, which lights it warmly
+#define PARTING vec4(-0.8, 1.4, 3.4, 0.42)  // mm from the roots: scalp, hair; how unevenly strands begin; most of the scalp seen
+#define SCALP vec3(0.62, 0.56, 0.51)  // of skin between hair, which lights it warmly
 #define STAGGERED 1.37  // texels along the strands, by which each row of texels lies further than the one beside it
 #ifdef GRAIN_TEXELS
 #define WIDE 1.15  // texels across strands for one of the smaller texture: finer ones are smaller than a pixel and sparkle

@@ -107,6 +107,29 @@ def test_hairs_thin_out_to_nothing_at_every_edge_that_is_seen(made: dict[str, li
         assert over[[0, -1]].max() == pytest.approx(-BARE) and over[:, -1].max() < 0.1
 
 
+def test_a_moustache_grows_in_softly_and_shows_the_hollow_below_the_nose(
+    made: dict[str, list[Patches]], name: str
+) -> None:
+    """Else it is a strip stuck on: its borders take more than one row of vertices, its ends more than one column."""
+    for lip in made[name][1::2]:
+        cover = lip.strands[0, ..., 2]
+        middle, half = len(cover) // 2, cover.max(axis=1)
+        assert (cover[:, 0] < cover[:, 1] - 0.05).sum() > 10 and (cover[:, 1] < cover[:, 2] - 0.05)[4:-4].all()
+        assert (cover[4:-4, -2] < cover[4:-4, -3] - 0.02).all()
+        assert (np.diff(half[:5]) > 0.04).all() and (np.diff(half[-5:]) < -0.04).all()
+        assert half[middle] < 0.9 * half[middle - 4 : middle + 5].max()
+
+
+def test_a_moustache_ends_at_the_upper_lip_and_no_lower_than_the_corners_of_the_mouth(
+    made: dict[str, list[Patches]], name: str
+) -> None:
+    for lip in made[name][1::2]:
+        lower = lip.points[0, :, -1, 1]
+        assert lower[len(lower) // 2] == pytest.approx(module._LIPS[1] + 8.0, abs=1.5)
+        assert lower.min() > module._LIPS[1] - 0.5, "it hangs over them"
+        assert (np.diff(lip.points[0, :, :, 1]) < 0.0).all()
+
+
 def test_hairs_are_short_where_they_come_out_of_the_skin(made: dict[str, list[Patches]], name: str) -> None:
     along = np.diff(made[name][0].strands[0, 20, :, 1])
     assert along[0] > 3.0 * along[-1] > 0.0

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from surface.fit.wardrobe.curls import afro, crop
+from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.skin import CENTRE, Skin
 from surface.fit.wardrobe.styles import Style
 from tests.surface.fit.wardrobe.invariants import asymmetry, check_patches, heights, outward_share, points_of
@@ -46,6 +47,17 @@ def test_a_shell_is_closed_behind_with_whole_tiles_and_thins_out_at_its_edge(sty
         np.testing.assert_allclose(strands[-1, :, 2:], strands[0, :, 2:])
         assert (strands[:, -1, 2] < 0.3 * strands[:, 0, 2]).all()
         np.testing.assert_allclose(patch.points[0, 0], patch.points[0, -1], atol=1e-6)
+
+
+def test_the_innermost_shell_grows_dense_slowly_and_nowhere_in_bites(style: Style) -> None:
+    patch = style.patches[-1]
+    at = surface_at(patch.points[0], patch.degrees, [np.linspace(0.0, 1.0, n) for n in patch.grid])
+    inside, cover = style.hairline.inside(at.reshape(-1, 3)).reshape(patch.grid), patch.strands[0, ..., 2]
+    border = (inside > 2.0) & (inside < 12.0)
+    border[:, -1] = False
+    assert border.sum() > 40 and cover[border].max() < 0.95 and cover[inside < 6.0].max() < 0.5
+    level = cover[border] - np.polyval(np.polyfit(inside[border], cover[border], 1), inside[border])
+    assert level.std() < 0.06
 
 
 def test_a_cloud_is_larger_than_a_crop(skin: Skin) -> None:

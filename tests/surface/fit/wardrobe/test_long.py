@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from surface.fit.wardrobe import long as module
-from surface.fit.wardrobe.long import ALONG_PART, FANNED, LAYERS, PART_X, TIPS_Y, long
-from surface.fit.wardrobe.skin import Skin
+from surface.fit.wardrobe.long import ALONG_PART, BEGINS_MM, FANNED, LAYERS, PART_X, TIPS_Y, long
+from surface.fit.wardrobe.skin import CENTRE, Skin
 from surface.fit.wardrobe.styles import Style
 from tests.surface.fit.wardrobe.invariants import check_patches, heights, points_of
 
@@ -44,8 +44,18 @@ def test_the_parting_goes_from_the_line_backwards_and_fans_out_at_its_end(skin: 
     roots = module._parting(skin, style.hairline)
     assert roots.shape == (ALONG_PART + FANNED, 3)
     assert (np.diff(roots[:ALONG_PART, 2]) < 0.0).all() and style.hairline.inside(roots).min() > 1.0
+    assert BEGINS_MM <= style.hairline.inside(roots[:1])[0] < BEGINS_MM + 2.0  # the under-cap stood out before it
     np.testing.assert_array_equal(roots[ALONG_PART:], np.tile(roots[ALONG_PART - 1], (FANNED, 1)))
     assert np.abs(heights(skin, roots)).max() < 2.5
+
+
+def test_the_parting_wanders_a_little(skin: Skin, style: Style) -> None:
+    """One drawn with a ruler is no person's."""
+    x, y, _ = module._parting(skin, style.hairline)[:ALONG_PART].T
+    aside = x / (y - CENTRE[1])  # as seen from the skull's middle: a straight one has the same everywhere
+    aside = aside / aside.mean() * PART_X - PART_X
+    assert 0.8 < np.ptp(aside) < 4.0
+    assert (np.diff(np.sign(aside)) != 0).sum() >= 3
 
 
 def test_hair_over_an_ear_stands_off_there_alone() -> None:

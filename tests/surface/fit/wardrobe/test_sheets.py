@@ -143,6 +143,14 @@ def falling(skin: Skin) -> Comb:
     return Comb(roots, np.full(9, 120.0), lambda at: np.full(len(at), 10.0), flow, lambda at: at[:, 1] - 95.0, 0.0, 0.0)
 
 
+def test_light_reaches_inner_sheets_where_outer_ones_fray() -> None:
+    """Else the edge of light hair is a dark band."""
+    dark = Layer(1.0, 0.8, 0.6, fray_mm=20.0)
+    plain, edged = made(dark).strands[0, ..., 3], made(dark, frayed=(0.0, 0.25)).strands[0, ..., 3]
+    assert (edged[-1] > plain[-1] + 0.2).all() and edged.max() <= 1.0
+    np.testing.assert_array_equal(edged[:-5], plain[:-5])
+
+
 def test_inner_sheets_back_the_frayed_edges_of_outer_ones(skin: Skin) -> None:
     """Through the gaps between strands of an edge one sees hair, not a dotted line of skin."""
     layers = tuple(Layer(share, 0.8, 1.0) for share in (1.0, 0.9, 0.8))

@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.short import CROWN, FRINGED, SWEPT, short, swept, thin
 from surface.fit.wardrobe.skin import CENTRE, Skin
 from surface.fit.wardrobe.styles import Style
@@ -49,6 +50,18 @@ def test_strands_go_from_the_crown_to_the_line(style: Style) -> None:
         assert (np.linalg.norm(tip - CROWN, axis=1) > 45.0).all()
         assert style.hairline.inside(tip).max() < 30.0  # they end near the line, or beyond it
         np.testing.assert_allclose(points[0], points[-1], atol=6.0)  # closed behind, but for locks
+
+
+def test_swept_hair_grows_dense_slowly_at_the_nape(skin: Skin) -> None:
+    """The innermost sheet ended in a line, in tufts."""
+    made = swept(skin)
+    patch = made.patches[-1]
+    at = surface_at(patch.points[0], patch.degrees, [np.linspace(0.0, 1.0, n) for n in patch.grid])
+    inside, cover = made.hairline.inside(at.reshape(-1, 3)).reshape(patch.grid), patch.strands[0, ..., 2]
+    nape = (at[..., 2] < -45.0) & (inside > 0.0) & (inside < 0.75 * SWEPT[-1].edge_mm)
+    assert nape.sum() > 20 and cover[nape].max() < 1.0
+    wanted = (inside[nape] + 1.0) / SWEPT[-1].edge_mm  # hair is cut so far outside the line
+    assert np.median(np.abs(cover[nape] - wanted)) < 0.1 and (cover[nape] - wanted).max() < 0.2
 
 
 def test_the_same_head_gets_the_same_hair(style: Style, make: Callable[[Skin], Style], skin: Skin) -> None:

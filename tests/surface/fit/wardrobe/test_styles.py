@@ -7,7 +7,7 @@ import pytest
 
 from surface.fit.wardrobe.hairline import Hairline
 from surface.fit.wardrobe.skin import CENTRE, Skin
-from surface.fit.wardrobe.styles import cap, step, tangent
+from surface.fit.wardrobe.styles import BARE, cap, step, tangent, thinned
 from tests.surface.fit.wardrobe.invariants import check_patches, heights, outward_share
 
 
@@ -27,6 +27,17 @@ def test_directions_along_a_skin_are_across_its_normals_and_as_near_as_can_be() 
     np.testing.assert_allclose((found * normals).sum(axis=1), 0.0, atol=1e-12)
     best = np.linalg.norm(wanted - (wanted * normals).sum(axis=1, keepdims=True) * normals, axis=1)
     np.testing.assert_allclose((found * wanted).sum(axis=1), best)  # the cosine is the greatest there is
+
+
+def test_hair_of_any_cover_thins_out_evenly_over_the_whole_of_its_border() -> None:
+    """A closed sheet fell from all to nothing within a fifth of it."""
+    left = np.linspace(-2.0, 2.0, 401)
+    for cover in (0.4, 1.8):
+        found = thinned(np.full(401, cover), left)
+        assert (np.diff(found) >= 0.0).all() and found[0] == -BARE
+        np.testing.assert_allclose(found[left >= 1.0], cover)
+        between = (left > -BARE) & (left < min(cover, 1.0) - 1e-9)
+        np.testing.assert_allclose(found[between], left[between])
 
 
 @pytest.mark.parametrize(("share", "short_mm"), [(0.5, 3.0), (0.93, 12.0)])

@@ -14,7 +14,18 @@ from surface.base.errors import HeadFileError
 from surface.head import Head
 from surface.head.model.data import Neck
 from surface.head.model.parameters import rotation
-from surface.head.posing.dressing import ALONG_MM, CURLED_MM, SCALP, SHADED, THROUGH, WornMesh, dress, sample_picture
+from surface.head.posing.dressing import (
+    ALONG_MM,
+    CURLED_MM,
+    ENDS_MM,
+    NOT_BARE_MM,
+    SCALP,
+    SHADED,
+    THROUGH,
+    WornMesh,
+    dress,
+    sample_picture,
+)
 
 
 @pytest.fixture
@@ -81,8 +92,20 @@ def test_hair_that_hangs_knows_how_far_its_roots_are_and_what_skin_shows_there(h
     along = worn.parts[0].arrays["strands"][:, 1]
     for patch in np.unique(np.floor(part.uv[:, 0] / 2.0)):
         own = np.floor(part.uv[:, 0] / 2.0) == patch
-        assert part.attributes["roots"][own, 0] == pytest.approx(ALONG_MM * (along[own] - along[own].min()))
+        closed = part.attributes["roots"][own, 0] - ALONG_MM * (along[own] - along[own].min())
+        _check_closed(part.vertices[own].astype(float), np.asarray(part.uv)[own], closed)
     assert part.attributes["scalp"][0] == pytest.approx([0.4 / 0.8, 400.0, 400.0])
+
+
+def _check_closed(at: np.ndarray, uv: np.ndarray, closed: np.ndarray) -> None:
+    """A parting is closed at both ends, open in between, and along each strand as at its root."""
+    roots = np.flatnonzero(uv[:, 1] == uv[:, 1].min())
+    roots = roots[np.argsort(uv[roots, 0])]
+    ends = np.minimum(*(np.linalg.norm(at[roots] - at[roots[k]], axis=1) for k in (0, -1)))
+    straight = NOT_BARE_MM * np.clip(1.0 - ends / ENDS_MM, 0.0, 1.0)
+    assert closed[roots[[0, -1]]] == pytest.approx(NOT_BARE_MM)
+    assert (closed[roots] <= straight + 1e-3).all() and closed[roots].min() < 0.8 * NOT_BARE_MM
+    assert closed == pytest.approx(np.interp(uv[:, 0], uv[roots, 0], closed[roots]), abs=1e-4)
 
 
 def test_hair_that_does_not_hang_has_no_parting(head: Head) -> None:
