@@ -34,7 +34,9 @@ def test_turns_that_come_too_late_are_left_out() -> None:
     wait_for(lambda: len(times) >= 8)
     thread.stop()
     assert times[1] - times[0] >= 0.05
-    assert (np.diff(times) < 0.001).sum() <= 1, "five turns were missed, and do not come all at once"
+    apart_s = np.diff(times)
+    late = (apart_s > 0.015).sum()  # the first turn is; on a busy machine others may be, too
+    assert (apart_s < 0.001).sum() <= late, "five turns were missed, and do not come all at once"
 
 
 def test_it_can_be_stopped_before_it_was_started() -> None:
