@@ -18,7 +18,7 @@ from surface.base.arrays import Floats, Ints
 from surface.fit.source.mesh import FitMesh
 from surface.head.model.parameters import smoothstep
 
-FRONT_MM = (60.0, 90.0)  # z: what lies further back than the first is not pulled, what lies before the second is
+FRONT_MM = (60.0, 90.0)  # z: what lies further back than the first is not changed, what lies before the second is
 INSIDE, OUTSIDE = 0.7, 1.6  # of an ellipse: what it smooths wholly, and from where on nothing
 ACROSS_MM = -6.0  # x on the other side of the face up to which a pull on one side is felt
 
@@ -51,7 +51,7 @@ class Smoothing:
     reach: tuple[float, float]
     width: float
 
-    def of(self, deltas: Floats, points: Floats, side: float) -> Floats:
+    def smooth(self, deltas: Floats, points: Floats, side: float) -> Floats:
         """(n, 3) displacements, mm, made smooth from those of points (n, 3) on the left, ``side`` 1, or right, -1."""
         x, y, z = (points * [side, 1.0, 1.0]).T
         away = np.hypot((x - self.centre[0]) / self.reach[0], (y - self.centre[1]) / self.reach[1])
@@ -63,13 +63,11 @@ class Smoothing:
         return out
 
 
-def _means(deltas: Floats, points: Floats, of: Ints, width: float) -> Floats:
-    """(k, 3) means of the displacements (n, 3) around the points with the indices ``of`` (k,)."""
-    near = cKDTree(points[of]).sparse_distance_matrix(cKDTree(points), 3.0 * width, output_type="coo_matrix")
-    shape = (len(of), len(points))
-    around = csr_matrix((np.exp(-0.5 * (near.data / width) ** 2), (near.row, near.col)), shape)
-    oneself = csr_matrix((np.ones(len(of)), (np.arange(len(of)), of)), shape)  # a distance of 0 may be left out above
-    weights = around.maximum(oneself)
+def _means(deltas: Floats, points: Floats, within: Ints, width: float) -> Floats:
+    """(k, 3) means of the displacements (n, 3) around the points (n, 3) with the indices ``within`` (k,), mm."""
+    near = cKDTree(points[within]).sparse_distance_matrix(cKDTree(points), 3.0 * width, output_type="coo_matrix")
+    counts = np.exp(-0.5 * (near.data / width) ** 2)
+    weights = csr_matrix((counts, (near.row, near.col)), (len(within), len(points)))
     means: Floats = (weights @ deltas) / np.asarray(weights.sum(axis=1))
     return means
 
@@ -101,7 +99,7 @@ def strengthen(mesh: FitMesh, wanted: Iterable[Strength]) -> FitMesh:
             for side in _sides(mesh.names[k]):
                 deltas[k] += sum((pull.at(mesh.vertices, side) for pull in strength.pulls), np.zeros(3))
                 for smoothing in strength.smoothed:
-                    deltas[k] = smoothing.of(deltas[k], mesh.vertices, side)
+                    deltas[k] = smoothing.smooth(deltas[k], mesh.vertices, side)
     return replace(mesh, deltas=deltas)
 
 

@@ -15,7 +15,7 @@ from surface import DCPSurface
 from surface.head import Head, save_data
 from surface.head.model.file import load_data
 from surface.head.model.light import LightPoints
-from surface.head.model.look import Worn
+from surface.head.model.look import Look, Worn
 from surface.head.model.meshes import make_surface
 from surface.head.model.rounding import with_rounder_outlines
 from surface.head.model.wardrobe import DRAWN, carried, read_garment, with_garments
@@ -101,7 +101,7 @@ def test_clothes_become_rounder_and_stay_dressed() -> None:
     shirt = read_garment(Worn(find_config("wardrobe", "clothes-shirt.npz"), (0.2, 0.2, 0.2)))
     data = with_garments(load_data(find_config("heads", "ict")), (shirt,), "there")
     cloth = next(part for part in data.parts if part.material == "cloth")
-    round_, finer = with_rounder_outlines(replace(data, parts=[cloth]), 0.1, {}, lambda name, mesh: {})
+    round_, finer = with_rounder_outlines(replace(data, parts=[cloth]), 0.05, {}, lambda name, mesh: {})
 
     surface = make_surface(cloth)
 
@@ -111,7 +111,7 @@ def test_clothes_become_rounder_and_stay_dressed() -> None:
         assert np.linalg.norm(along, axis=1).min() > 0.1, "vertices of a border are taken from its side"
         return farthest_middle(surface, uv, places, mesh["mesh_triangles"], least=1)
 
-    assert away_mm(cloth.mesh) > 4.0 and away_mm(round_.parts[0].mesh) <= 0.1
+    assert away_mm(cloth.mesh) > 4.0 and away_mm(round_.parts[0].mesh) <= 0.05
 
     (before,), (after,) = shirt.parts, carried(shirt, finer).parts
     count = len(before.arrays["strands"])
@@ -125,6 +125,16 @@ def test_clothes_become_rounder_and_stay_dressed() -> None:
     assert np.abs(after.arrays["strands"][count:] - after.arrays["strands"][ends].mean(axis=1)).max() < 1e-5
     hair = replace(before, name="hair")
     assert carried(replace(shirt, parts=(hair,)), finer).parts == (hair,), "no mesh of it became finer"
+
+
+@pytest.mark.slow
+def test_a_dressed_head_is_posed_with_round_clothes() -> None:
+    """At the end of a garment's patch the surface is that before it: after it there is nothing."""
+    look = Look(melanin=0.5, worn=(Worn(find_config("wardrobe", "clothes-shirt.npz"), (0.2, 0.2, 0.2)),))
+    head = Head.load(find_config("heads", "ict"), look=look, chord_mm=0.05)
+    head.pose(head.values({}))
+    cloth = head.part("clothes")
+    assert farthest_mm(cloth) <= 0.05 and np.isfinite(cloth.normals).all()
 
 
 @pytest.mark.slow
