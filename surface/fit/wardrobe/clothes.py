@@ -89,8 +89,8 @@ def garment(skin: Skin, neck: Neck) -> list[Patches]:
     seen = skin.points[hidden_below(skin, neck) < 0.5]
     if neck.roll > 0.0:
         openness = np.concatenate([_ROLLED[:, 4], np.linspace(0.75, 1.0, 3), np.ones(len(trunk) - 3)])
-        return [_shaded(_patch(points, (73, 33), (41, 17), openness), seen)]
-    out = [_patch(points, (73, 25), (41, 13), _dark_within((1.5 if neck.fold else 1.0) * len(collar), points.shape[1]))]
+        return [_shaded(_patch(points, (73, 33), (33, 33), openness), seen)]
+    out = [_patch(points, (73, 25), (33, 25), _dark_within((1.5 if neck.fold else 1.0) * len(collar), points.shape[1]))]
     if neck.fold:
         around = _dense_in_front(_FOLDED)
         folded = _closed(np.stack(_folded(skin, _ring(skin, neck, around), around), axis=1))

@@ -15,6 +15,31 @@ from surface.view.scene.theme import Theme
 if TYPE_CHECKING:
     import moderngl
 
+#: Pixels to each side that smooth.frag follows an edge.
+_REACH = 10
+
+
+class _Pass:
+    """A fragment shader run over rectangles of a texture, into a framebuffer."""
+
+    def __init__(self, ctx: moderngl.Context, shader: str, source: moderngl.Texture, into: moderngl.Framebuffer) -> None:
+        self._source, self._into, self.size = source, into, into.size
+        self._program = build(ctx, ("background.vert",), (shader,))
+        set_uniforms(self._program, {"picture": 1, "reach": _REACH})
+        self._rectangles = Rectangles(ctx, self._program)
+
+    def run(self, boxes: np.ndarray) -> None:
+        """Draw `boxes` (k, 4) of the framebuffer."""
+        self._into.scissor = 0, 0, *self.size
+        self._into.use()
+        self._source.use(1)
+        self._rectangles.render(corners(boxes, self.size))
+
+    def release(self) -> None:
+        """Release what was made."""
+        self._rectangles.release()
+        self._program.release()
+
 
 class Target:
     """A picture in memory that a renderer is drawn into.
@@ -42,13 +67,17 @@ class Target:
         self.texture = ctx.texture(size, 4)
         self.picture = ctx.framebuffer([self.texture])
         self._raw: moderngl.Texture | None = None
-        self._smooth: Rectangles | None = None
+        self._passes: list[_Pass] = []
         if single:
             self._raw = ctx.texture(inner, 4)
             self._raw.filter = (ctx.NEAREST, ctx.NEAREST)
-            self._program = build(ctx, ("background.vert",), ("smooth.frag" if inner == size else "enlarge.frag",))
-            set_uniforms(self._program, {"picture": 1, "share": np.divide(inner, size)})
-            self._smooth = Rectangles(ctx, self._program)
+            if inner == size:
+                self._passes = [_Pass(ctx, "smooth.frag", self._raw, self.picture)]
+            else:
+                level = ctx.texture(inner, 4)
+                level.repeat_x = level.repeat_y = False
+                smoothed = ctx.framebuffer([level])
+                self._passes = [_Pass(ctx, "smooth.frag", self._raw, smoothed), _Pass(ctx, "enlarge.frag", level, self.picture)]
         many = 0 if single else self.samples
         colour = self._raw or ctx.renderbuffer(inner, 4, samples=many)
         self._drawn = ctx.framebuffer([colour], ctx.depth_renderbuffer(inner, samples=many))
@@ -86,16 +115,14 @@ class Target:
         bands, self._pending = self._pending, None
         if bands is None:
             return
-        if self._smooth is None or self._raw is None:
+        if not self._passes:
             self.picture.scissor = bands.box()
             self._ctx.copy_framebuffer(self.picture, self._drawn)
             return
         boxes, inner = bands.boxes(), self._drawn.size
-        self.picture.scissor = 0, 0, *self.size
-        self.picture.use()
         self._ctx.enable_only(self._ctx.NOTHING)
-        self._raw.use(1)
-        self._smooth.render(corners(boxes if inner == self.size else enlarged(boxes, inner, self.size), self.size))
+        for each in self._passes:
+            each.run(boxes if each.size == inner else enlarged(boxes, inner, each.size))
 
     def read(self) -> np.ndarray:
         """The picture, (height, width, 3) uint8, top row first."""
@@ -104,9 +131,8 @@ class Target:
 
     def release(self) -> None:
         """Release the buffers."""
-        if self._smooth is not None:
-            self._smooth.release()
-            self._program.release()
+        for each in self._passes:
+            each.release()
         for frame in (self._drawn, self.picture, self._flush):
             for attachment in (*frame.color_attachments, frame.depth_attachment):
                 if attachment is not None:

@@ -10,6 +10,7 @@
 #else
 #define SHADES vec3(0.15, 0.9, 0.8)
 #endif
+#define STRAND 0.5  // an alpha by which smooth.frag knows strands
 uniform sampler2D detail;
 uniform vec3 scalp;  // how much brighter than hair the skin at a parting is
 uniform bool multisampled;  // alpha then decides how many samples of a pixel a strand covers
@@ -77,5 +78,5 @@ void main() {
         float bare = PARTING.w * (1.0 - smoothstep(PARTING.x, PARTING.y, roots + PARTING.z * (noise.w - 0.5)));
         lit = mix(lit, SCALP * scalp * v_colour.rgb, bare);
     }
-    colour = vec4(encode(lit), cover);
+    colour = vec4(encode(lit), multisampled ? cover : STRAND);
 }
