@@ -196,8 +196,8 @@ class Renderer:
         target.use()  # again: it applies the masks
         self.ctx.viewport = (0, 0, width, height)
         self.ctx.depth_func = "<="
-        mixed = self.ctx.SRC_ALPHA, self.ctx.ONE_MINUS_SRC_ALPHA
-        self.ctx.blend_func = *mixed, self.ctx.ONE, self.ctx.ONE_MINUS_SRC_ALPHA
+        factors = self.ctx.SRC_ALPHA, self.ctx.ONE_MINUS_SRC_ALPHA, self.ctx.ONE, self.ctx.ONE_MINUS_SRC_ALPHA
+        self.ctx.blend_func = factors  # type: ignore[assignment]  # its types know two; alpha stays what it was
         self._aim(camera, width / max(height, 1))
         self._detail.use(0)
         if self._texture is not None:

@@ -22,23 +22,37 @@ _REACH = 10
 class _Pass:
     """A fragment shader run over rectangles of a texture, into a framebuffer."""
 
-    def __init__(self, ctx: moderngl.Context, shader: str, source: moderngl.Texture, into: moderngl.Framebuffer) -> None:
-        self._source, self._into, self.size = source, into, into.size
+    def __init__(
+        self, ctx: moderngl.Context, shader: str, source: moderngl.Texture, into: moderngl.Framebuffer
+    ) -> None:
+        self._source, self.into = source, into
         self._program = build(ctx, ("background.vert",), (shader,))
         set_uniforms(self._program, {"picture": 1, "reach": _REACH})
         self._rectangles = Rectangles(ctx, self._program)
 
-    def run(self, boxes: np.ndarray) -> None:
-        """Draw `boxes` (k, 4) of the framebuffer."""
-        self._into.scissor = 0, 0, *self.size
-        self._into.use()
+    def run(self, boxes: np.ndarray, size: tuple[int, int]) -> None:
+        """Draw what lies within `boxes` (k, 4) of a picture of `size`, whatever the framebuffer's is."""
+        if size != self.into.size:
+            boxes = enlarged(boxes, size, self.into.size)
+        self.into.scissor = 0, 0, *self.into.size
+        self.into.use()
         self._source.use(1)
-        self._rectangles.render(corners(boxes, self.size))
+        self._rectangles.render(corners(boxes, self.into.size))
 
     def release(self) -> None:
         """Release what was made."""
         self._rectangles.release()
         self._program.release()
+
+
+def _passes(ctx: moderngl.Context, raw: moderngl.Texture, picture: moderngl.Framebuffer) -> list[_Pass]:
+    """What makes a picture of its pixels as they were drawn: smoothing, and enlarging where they are fewer."""
+    if raw.size == picture.size:
+        return [_Pass(ctx, "smooth.frag", raw, picture)]
+    smoothed = ctx.texture(raw.size, 4)
+    smoothed.repeat_x = smoothed.repeat_y = False
+    first = _Pass(ctx, "smooth.frag", raw, ctx.framebuffer([smoothed]))
+    return [first, _Pass(ctx, "enlarge.frag", smoothed, picture)]
 
 
 class Target:
@@ -71,13 +85,7 @@ class Target:
         if single:
             self._raw = ctx.texture(inner, 4)
             self._raw.filter = (ctx.NEAREST, ctx.NEAREST)
-            if inner == size:
-                self._passes = [_Pass(ctx, "smooth.frag", self._raw, self.picture)]
-            else:
-                level = ctx.texture(inner, 4)
-                level.repeat_x = level.repeat_y = False
-                smoothed = ctx.framebuffer([level])
-                self._passes = [_Pass(ctx, "smooth.frag", self._raw, smoothed), _Pass(ctx, "enlarge.frag", level, self.picture)]
+            self._passes = _passes(ctx, self._raw, self.picture)
         many = 0 if single else self.samples
         colour = self._raw or ctx.renderbuffer(inner, 4, samples=many)
         self._drawn = ctx.framebuffer([colour], ctx.depth_renderbuffer(inner, samples=many))
@@ -119,10 +127,10 @@ class Target:
             self.picture.scissor = bands.box()
             self._ctx.copy_framebuffer(self.picture, self._drawn)
             return
-        boxes, inner = bands.boxes(), self._drawn.size
+        boxes = bands.boxes()
         self._ctx.enable_only(self._ctx.NOTHING)
         for each in self._passes:
-            each.run(boxes if each.size == inner else enlarged(boxes, inner, each.size))
+            each.run(boxes, self._drawn.size)
 
     def read(self) -> np.ndarray:
         """The picture, (height, width, 3) uint8, top row first."""
@@ -133,7 +141,8 @@ class Target:
         """Release the buffers."""
         for each in self._passes:
             each.release()
-        for frame in (self._drawn, self.picture, self._flush):
+        between = [each.into for each in self._passes[:-1]]
+        for frame in (self._drawn, self.picture, self._flush, *between):
             for attachment in (*frame.color_attachments, frame.depth_attachment):
                 if attachment is not None:
                     attachment.release()

@@ -2,7 +2,8 @@
 #define WIDE_SHARPNESS 11.0     // the narrow lobe is the wide one to the fourth power
 #define WIDE 0.150              // of the gloss, as NARROW
 #define NARROW 0.27
-#define SATIN 1.25              // of the gloss, for sky and fill light, in skin so dark that hardly any spreads under it
+#define SATIN 0.85              // of the gloss, for sky and fill light, in skin so dark that hardly any spreads under it
+#define SATIN_COLOUR vec3(1.0, 0.88, 0.78)  // or the sky's blue makes it grey, like wax
 #define SATIN_MOST 0.24         // of the gloss, that counts: lips have theirs
 
 uniform vec3 wrap;
@@ -52,7 +53,7 @@ vec3 satin(vec3 n, vec3 v, float red, float occlusion, float gloss) {
     mirrored *= mirrored;
     mirrored *= mirrored;
     float dark = clamp(1.0 - 2.2 * red, 0.0, 0.6);
-    return SATIN * min(gloss, SATIN_MOST) * dark * occlusion * mirrored * mirrored * (sky + fill_colour);
+    return SATIN * min(gloss, SATIN_MOST) * dark * occlusion * mirrored * mirrored * SATIN_COLOUR * (sky + fill_colour);
 }
 
 // Scale of the key light's highlights: none in the shade, more at grazing angles.

@@ -2,7 +2,7 @@
 // followed along its row or column to both ends, and the pixel takes as much of its neighbour across the edge as a
 // straight line between those ends covers of it (after Lottes, "FXAA", 2009). Strands, which end in single pixels
 // without order, have an alpha below 1; where they meet something else, pixels take the weighted mean of nine.
-#define EDGE 0.035  // least difference of brightness
+#define EDGE 0.035  // difference of brightness above which it is smoothed, wholly at twice that
 #define STEP_ENDS 0.25  // of the difference across an edge: a change along it that ends it
 #define SINGLE 0.7  // most that a pixel which stands out alone gives away
 uniform sampler2D picture;
@@ -79,5 +79,6 @@ void main() {
     float share = crossed ? 0.5 - (float(min(left, right)) - 0.5) / float(left + right - 1) : 0.0;
     float single = clamp(abs((2.0 * sides.g + corners.g) / 12.0 - middle.g) / range.g, 0.0, 1.0);
     single = smoothstep(0.0, 1.0, single);
-    colour.rgb = mix(middle.rgb, beside.rgb, max(share, SINGLE * single * single));
+    float clear = clamp(range.g / EDGE - 1.0, 0.0, 1.0);
+    colour.rgb = mix(middle.rgb, beside.rgb, clear * max(share, SINGLE * single * single));
 }

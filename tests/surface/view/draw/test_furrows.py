@@ -57,7 +57,7 @@ def test_folds_of_a_smile_are_darker_and_redder_from_the_front(
     folder: Path, monkeypatch: pytest.MonkeyPatch, way: dict[str, str]
 ) -> None:
     less = darker(folder, monkeypatch, SMILE, **way)
-    assert less.min() >= -2.0, "nothing becomes brighter"
+    assert less.min() >= -5.0, "nothing becomes brighter but where another edge is smoothed"
     for side in (less[:, :180], less[:, 180:]):  # the key light meets the left half of the picture face on
         assert side.max() > 25.0
         floor = side.max(axis=2) > 12.0
