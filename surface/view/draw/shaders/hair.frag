@@ -25,7 +25,7 @@ void main() {
         float full = cover * rows + 0.12 * min(1.0, 2.5 * ends) * rows;
         float fine = texture(detail, vec2(FINER * across, 0.06 * v_along.y + 0.5)).x + 0.15;
         float grown = max(smoothstep(-HAIR, HAIR, full + hair - 0.94), 0.75 * smoothstep(-HAIR, HAIR, full + fine - 0.94));
-        cover = fade.w * max(grown, GROUND * rows * ends) * min(1.0, 1.6 * ends);
+        cover = fade.w * max(grown, GROUND * rows * ends) * min(1.0, 3.0 * ends);
     }
     colour = vec4(v_colour, clamp(cover, 0.0, 1.0) * v_strength);
 }
