@@ -18,7 +18,7 @@ from controller.body.multi_head import MultiHeadBody
 from controller.stage.stage import Stage, heads_of
 
 _SCRIPT = ".toml"
-_OUTSIDE: dict[str, Any] = {"links": [], "robots": [], "voice": None}
+_OUTSIDE: dict[str, Any] = {"links": [], "voice": None}
 _SOURCES: dict[str, Any] = {"show": None, "take": None}
 _EARLY = 1e-9  # of a tick: rounding of a time that is meant to be that of a tick
 

@@ -94,7 +94,8 @@ def render(
     stage: Annotated[
         str | None,
         typer.Option(
-            help="Stage file that sets the head, groups, expressions and picture, unless other options do.",
+            help="Stage file that sets head or heads, groups, expressions, picture and idle motion of films, unless "
+            "other options do.",
             autocompletion=names_of("stages"),
         ),
     ] = None,

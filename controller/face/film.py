@@ -44,7 +44,7 @@ def film_rows(
     held = [set_by_hand & ~mask] + [set_by_hand] * (len(heads_of(stage)) - 1)
     rows, beside = play_offline(stage, path, len(motion), fps, still.values, held)
     if lives is not None:
-        rows[:, 0] = alone  # layers, and so what is held, do not change a recording
+        rows[:, 0], beside[:, 0] = alone, lives  # layers, and so what is held, do not change a recording
     return rows, beside
 
 

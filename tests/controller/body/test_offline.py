@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controller.base.errors import ControllerError
+from controller.base.errors import ControllerError, TakeError
 from controller.base.parameters import PARAMETERS as P
 from controller.body.offline import play_offline
 from controller.links.line.script import load_script
@@ -130,18 +130,36 @@ def test_other_heads_live_as_they_would_alone(tmp_path: Path) -> None:
         np.testing.assert_allclose(rows[k, 1], out, atol=1e-12)
 
 
-def test_the_file_replaces_what_the_first_head_plays_and_nothing_outside_is_opened(tmp_path: Path) -> None:
+def test_the_file_replaces_what_the_first_head_plays_and_nothing_outside_is_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*what: object, **how: object) -> None:
+        raise AssertionError(f"opened {what} {how}")
+
+    for outside in ("LinkPart", "BusLoop", "Voice"):
+        monkeypatch.setattr(f"controller.body.body.{outside}", refuse)
     (tmp_path / "open.toml").write_text('steps = ["0 SET jawOpen 0.9"]')
     (tmp_path / "mouth.csv").write_text("time,cheekPuff\n0,0.4\n60,0.4\n")
     own = 'show = "open.toml"\ntake = "mouth.csv"\nvoice = "/dev/null/none.wav"\nrobots = ["head24"]\n'
-    link = '[[links]]\nport = "/dev/null/none"\n'
+    link = '\nport = "/dev/null/none"\n'
     file, puff = take_of(tmp_path, browInnerUp=0.5), P.index("cheekPuff")
-    rows, _ = played(stage_of(tmp_path, f'name = "one"\nliveliness = 0.5\n{own}{link}'), file)
+    rows, _ = played(stage_of(tmp_path, f'name = "one"\nliveliness = 0.5\n{own}[[links]]{link}'), file)
     assert rows[-1, 0, JAW] < 0.05 and rows[-1, 0, puff] < 0.05
     oak = DUET.replace("position_mm", f"{own}position_mm")
-    rows, _ = played(stage_of(tmp_path, oak.replace("[[heads]]", own + "[[heads]]", 1) + link), file)
+    rows, _ = played(
+        stage_of(tmp_path, oak.replace("[[heads]]", own + "[[heads]]", 1) + "[[heads.links]]" + link), file
+    )
     assert rows[-1, 0, [JAW, puff]].max() < 0.05
     assert rows[-1, 1, JAW] == pytest.approx(0.9) and rows[-1, 1, puff] == pytest.approx(0.4, abs=0.05)
+
+
+def test_an_error_of_a_take_ends_the_film(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(player: TakePlayer, now_ns: int) -> None:
+        raise TakeError("the disk is gone")
+
+    monkeypatch.setattr(TakePlayer, "tick", fail)
+    with pytest.raises(TakeError, match="the disk is gone"):
+        played(stage_of(tmp_path), take_of(tmp_path, jawOpen=0.5))
 
 
 def test_what_is_held_is_there_from_the_first_frame_and_as_if_set(tmp_path: Path) -> None:

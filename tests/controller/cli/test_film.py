@@ -10,10 +10,13 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from controller.base.errors import ConfigError
+from controller.base.errors import ConfigError, ControllerError
+from controller.base.parameters import PARAMETERS
 from controller.cli.app import make_app
 from controller.cli.film import _sound_of
 from controller.face.still import Still
+from controller.stage.stage import load_stage
+from controller.takes.recording import recorded
 from surface.base import ffmpeg
 from surface.base.errors import ViewError
 from surface.head import save_data
@@ -148,6 +151,18 @@ def test_a_show_knows_the_expressions_of_its_stage(duet: Path) -> None:
     (duet / "one.toml").write_text('name = "one"\nhead = "small"\nliveliness = 0.5\n')
     assert "11 frames" in film(duet, "b.webp", *mine, take="show.toml", stage="one.toml")
     assert (duet / "a.webp").read_bytes() != (duet / "b.webp").read_bytes()
+
+
+def test_a_recording_is_drawn_with_the_stage_that_it_is_of(duet: Path) -> None:
+    (duet / "one.toml").write_text('name = "one"\nhead = "small"\n[layers.manual]\nweight = 0.5\n')
+    out = PARAMETERS.neutral()
+    with recorded(load_stage(str(duet / "one.toml"), PARAMETERS).state(), duet / "a.rec") as state:
+        state.set_parameters([PARAMETERS.index("mouthPucker")], [1.0], 1)
+        for k in range(50):
+            state.tick(10_000_000 * (k + 1), 0.01, out)
+    assert "3 frames" in film(duet, "a.webp", take="a.rec", stage="one.toml")
+    with pytest.raises(ControllerError, match="came out differently"):
+        film(duet, "b.webp", take="a.rec", stage="duet.toml")
 
 
 @pytest.mark.parametrize("sound", ["../hello.wav", "/etc/hostname", ""])

@@ -149,8 +149,12 @@ def test_one_head_that_is_named_beside_such_a_stage_lives_as_its_first(tmp_path:
     assert lives[:, 0, 0].max() > 2.0
 
 
-@pytest.mark.parametrize(("more", "heads"), [("liveliness = 1.0\n", 1), ("liveliness = 1.0\n" + DUET, 2)])
-def test_a_recording_is_shown_as_it_is(tmp_path: Path, more: str, heads: int) -> None:
+@pytest.mark.parametrize(
+    ("more", "heads"), [("liveliness = 1.0\n", 1), ("control_hz = 50\nliveliness = 1.0\n" + DUET, 2)]
+)
+def test_a_recording_is_shown_as_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: str, heads: int) -> None:
+    if heads == 1:
+        monkeypatch.setattr(film, "play_offline", None)  # no layers are needed
     shown, beside, out = [], [], P.neutral()
     with recorded(CommandState(P), tmp_path / "a.rec") as state:
         state.live(1.0, 0)
