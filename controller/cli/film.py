@@ -45,20 +45,23 @@ def check_film(take: Path | None, sound: Path | None, rate_hz: float | None, oth
 def render_film(still: Still, out: Path, take: Path, sound: Path | None, rate_hz: float | None) -> None:
     """Draw the film and print what was written. Raises TakeError, ConfigError, ViewError."""
     # imported lazily: not needed for --help
-    from controller.face.film import FPS, base_of, draw_film
+    from controller.face.film import FPS, draw_film, film_rows
+    from controller.stage.stage import heads_of
+    from controller.takes.recording import default_state
     from controller.tools.motion_file import load_motion
 
     fps = rate_hz or FPS
     with console.status("reading"):
-        motion = load_motion(take, still.parameters, fps)
-        track = sound or _sound_of(take)
+        make = default_state if still.stage is None else heads_of(still.stage)[0].state
+        motion = load_motion(take, still.parameters, fps, make=make, vocabulary=still.vocabulary)
+        rows, lives = film_rows(still, take, motion.values, motion.mask, motion.lives, fps)
+        track = sound or _sound_of(take, still)
     silent = sound is None and out.suffix.lower() != ".mp4"
     columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("drawing", total=len(motion.values))
-        rows = base_of(still, motion.values, motion.mask)
-        count = draw_film(still, rows, out, fps, None if silent else track,
-                          lambda done, total: bar.update(task, completed=done), motion.lives)  # fmt: skip
+        task = bar.add_task("drawing", total=len(rows))
+        count = draw_film(still, rows, lives, out, fps, None if silent else track,
+                          lambda done, total: bar.update(task, completed=done))  # fmt: skip
     described = _describe_sound(track, silent=silent)
     console.print(f"{count} frames at {fps:g} per second, {described}", soft_wrap=True, markup=False)
     console.print(f"wrote {out}", soft_wrap=True)
@@ -70,13 +73,14 @@ def _describe_sound(sound: Path | None, *, silent: bool) -> str:
     return f"without the sound of {sound}, which only an .mp4 gets" if silent else f"with the sound of {sound}"
 
 
-def _sound_of(take: Path) -> Path | None:
-    """Return the sound file of a take or a show; None if it has none."""
+def _sound_of(take: Path, still: Still) -> Path | None:
+    """Return the sound file of a take, or of a show with the expressions of ``still``; None if it has none."""
     # imported lazily: not needed for --help
-    from controller.base.parameters import PARAMETERS
     from controller.links.line.script import load_script
     from controller.takes.reader import TAKES
 
     if any(take.suffix.lower() in TAKES.get(kind).suffixes for kind in _SOUND_READERS):
         return take
-    return load_script(str(take), PARAMETERS).sound if take.suffix.lower() == ".toml" else None
+    if take.suffix.lower() != ".toml":
+        return None
+    return load_script(str(take), still.parameters, still.vocabulary).sound

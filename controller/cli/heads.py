@@ -94,7 +94,8 @@ def render(
     stage: Annotated[
         str | None,
         typer.Option(
-            help="Stage file that sets the head, groups, expressions and picture, unless other options do.",
+            help="Stage file that sets head or heads, groups, expressions, picture and idle motion of films, unless "
+            "other options do.",
             autocompletion=names_of("stages"),
         ),
     ] = None,
@@ -124,7 +125,7 @@ def render(
     check_film(take, sound, rate_hz, {"--sheet": sheet, "--crowd": crowd})
     require("a picture", "moderngl", "PIL")
     # imported lazily: not needed for --help
-    from controller.face.still import Still, draw_crowd, draw_sheet, draw_still
+    from controller.face.still import Still, draw_crowd, draw_sheet, draw_still, reject_for_wall
     from controller.stage.persons import parse_person
     from controller.stage.picture import parse_background
 
@@ -138,6 +139,8 @@ def render(
     )  # fmt: skip
     if sheet and crowd:
         raise ConfigError("--sheet and --crowd draw different pictures", hint="leave out one of them")
+    if still.wall is not None:
+        reject_for_wall(still.wall, {"--sheet": sheet, "--crowd": crowd})
     if take is not None:
         render_film(still, out, take, sound, rate_hz)
         return

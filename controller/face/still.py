@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.base.errors import ParameterError
+from controller.base.errors import ConfigError, ParameterError
 from controller.base.parameters import PARAMETERS, Parameters
-from controller.base.paths import find_config
+from controller.base.paths import config_dir, find_config
 from controller.face.face import head_indices
 from controller.face.wall import Wall
 from controller.stage.persons import Person
@@ -48,8 +48,8 @@ class Still:
     head : folder of the head. identity : its variations, by name. groups : group files and their amounts.
     vocabulary : the named expressions. persons : the persons that it shows, each with its weight.
     parameters : those of the stage and of the named vocabularies.
-    wall : a stage of several heads, which are all drawn; None for one head. stage : whose idle motion films show; None
-    without a stage.
+    wall : a stage of several heads, which are all drawn; None for one head. stage : whose layers and idle motion films
+    show; None without a stage.
     """
 
     values: NDArray[np.float64]
@@ -74,8 +74,9 @@ class Still:
 
         Raises ParameterError or ConfigError, which names the invalid word and what is expected.
         """
-        base = load_stage(stage, PARAMETERS) if stage else None
-        files = [*(base.vocabularies if base else ()), *(find_config("vocabularies", name) for name in vocabularies)]
+        more = [find_config("vocabularies", name).resolve() for name in vocabularies]
+        base = load_stage(stage, PARAMETERS, more) if stage else None
+        files = base.vocabularies if base else more
         parameters = (base.parameters if base else PARAMETERS).with_files(files)
         vocabulary = Vocabulary.load(parameters, more=files)
         values = parameters.neutral()
@@ -84,6 +85,10 @@ class Still:
         for word in settings:
             places, value = parse_setting(word, parameters)
             values[places] = value
+        wall = None
+        if base is not None and base.heads and head is None:
+            wall = with_picture(base, look or {})
+            reject_for_wall(wall, {"--identity": identity, "--group": groups})
         folder = base.head if base and head is None else find_config("heads", head or "ict")
         wanted = dict(base.settings.identity) if base and identity is None else parse_identity(identity)
         check_identity(folder, wanted)
@@ -92,9 +97,6 @@ class Still:
         width_height = parse_size(size or "800x800") if size or base is None else face.size
         picture = with_options(face, look or {})
         persons = tuple(find_persons(picture.person, folder, beside=base.path if base else None))
-        wall = None
-        if base is not None and base.heads and head is None:
-            wall = with_picture(base, look or {})
         return cls(values, width_height, picture, folder, wanted, added, vocabulary, persons, parameters, wall, base)
 
     def load_head(self, chord_mm: float | None = None) -> Head:
@@ -109,6 +111,21 @@ class Still:
     def chord_mm(self) -> float:
         """How far the edges of triangles may lie from the skin, mm, so that no outline of the picture shows them."""
         return CHORD_PIXELS * SHOWN_MM / max(self.size)
+
+
+def reject_for_wall(wall: Stage, options: Mapping[str, object]) -> None:
+    """Raise ConfigError for an option that is given and that a picture of several heads cannot have.
+
+    wall : a stage of several heads. options : values of such options, by name.
+    """
+    for option in [name for name, value in options.items() if value]:
+        first = wall.heads[0].stage
+        shipped = first.head.parent == config_dir() / "heads"
+        person = f" --person {first.settings.face.person}" if isinstance(first.settings.face.person, str) else ""
+        raise ConfigError(
+            f"{option} is for one head, and {wall.path} has {len(wall.heads)}",
+            hint=f"name the head that is meant: --head {first.head.name if shipped else first.head}{person}",
+        )
 
 
 def parse_group(word: str) -> tuple[Path, float]:

@@ -73,12 +73,14 @@ class _Alike:
             self.head.live(*lives[0].tolist())
             self.screen.draw(values, self.camera)
 
-    def pictures(self, rows: Floats, lives: Floats, *, drawn: bool) -> list[Image]:
-        """Return one picture for each head; ``rows`` : (h, P) values, ``lives`` : (h, 2). drawn : whether :meth:`draw`
-        has drawn them."""
+    def pictures(self, rows: Floats, lives: Floats, time_s: float | None, *, drawn: bool) -> list[Image]:
+        """Return one picture for each head; ``rows`` : (h, P) values, ``lives`` : (h, 2). time_s : until when hair
+        sways; None: it stays. drawn : whether :meth:`draw` has drawn them."""
         assert self.screen is not None
         values = self._select(rows)
         if self.crowd is None:
+            if time_s is not None:
+                self.head.sway.advance(head_angles(values[0]), time_s)
             self.head.live(*lives[0].tolist())
             return [self.screen.read() if drawn else self.screen.render(values[0], self.camera)]
         self.crowd.pose(values, lives)
@@ -166,16 +168,19 @@ class Wall:
         for alike in self._alike:
             alike.draw(rows[alike.places], time_s, beside[alike.places])
 
-    def pictures(self, rows: Floats, lives: Floats | None = None, *, drawn: bool = False) -> list[Image]:
+    def pictures(
+        self, rows: Floats, lives: Floats | None = None, time_s: float | None = None, *, drawn: bool = False
+    ) -> list[Image]:
         """Return a picture (h, w, 3) uint8 of each head, in the order of the stage file.
 
-        rows, lives : as :meth:`draw`. drawn : whether it has drawn this frame.
+        rows, lives : as :meth:`draw`. time_s : until when the hair of heads that look like no other sways; None: it
+        stays. drawn : whether :meth:`draw` has drawn this frame.
         """
         found: dict[int, Image] = {}
         beside = np.zeros((len(rows), 2)) if lives is None else lives
         for alike in self._alike:
             places = alike.places
-            found.update(zip(places, alike.pictures(rows[places], beside[places], drawn=drawn), strict=True))
+            found.update(zip(places, alike.pictures(rows[places], beside[places], time_s, drawn=drawn), strict=True))
         return [found[i] for i in range(len(rows))]
 
     @property

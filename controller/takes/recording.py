@@ -35,7 +35,7 @@ _COMMANDS = ("set_parameters", "release", "expression", "gaze", "gaze_at", "gaze
 Maker = Callable[[Parameters, int, float], CommandState]
 
 
-def _default_state(parameters: Parameters, seed: int, period_s: float) -> CommandState:
+def default_state(parameters: Parameters, seed: int, period_s: float) -> CommandState:
     """Return a command state with the shipped layers, expressions and idle motion."""
     return CommandState(parameters, seed=seed, period_s=period_s)
 
@@ -92,7 +92,7 @@ def _write_error(path: Path, error: OSError) -> ControllerError:
     return ControllerError(f"{path}: cannot be written: {error.strerror}", hint="choose another path")
 
 
-def replay(path: Path, parameters: Parameters, *, make: Maker = _default_state) -> Iterator[tuple[int, Floats]]:
+def replay(path: Path, parameters: Parameters, *, make: Maker = default_state) -> Iterator[tuple[int, Floats]]:
     """Replay a recording and yield the time (ns) and parameters (P,) of each tick, always in the same array.
 
     make : returns the state to play into, for parameters, a seed and the length of a tick (s).
@@ -126,7 +126,7 @@ class Replay:
     since the first. beside : breath and pupils of the last one, see :class:`controller.layers.commands.CommandState`.
     """
 
-    def __init__(self, path: Path, parameters: Parameters, make: Maker = _default_state) -> None:
+    def __init__(self, path: Path, parameters: Parameters, make: Maker = default_state) -> None:
         self._states: list[CommandState] = []
         self._ticks = replay(path, parameters, make=lambda *how: self._keep(make(*how)))
         self._next, self.beside = self._read_next(), REST

@@ -16,9 +16,10 @@ from controller.links.line.show import Show
 from controller.takes.mcap_files import write_mcap
 from controller.takes.plain import write_plain
 from controller.takes.reader import load_take
-from controller.takes.recording import SUFFIX, replay
+from controller.takes.recording import SUFFIX, Maker, default_state, replay
 from controller.takes.retarget import load_ranges, retarget
 from controller.takes.voices.network import network_take
+from controller.vocabulary.vocabulary import Vocabulary
 
 SHOW_HZ = 60.0
 """Rows per second of shows and recordings."""
@@ -48,33 +49,42 @@ class Motion:
         return np.append(self.values, np.zeros((len(self.values), 1)), axis=1)
 
 
-def load_motion(path: Path, parameters: Parameters, rate_hz: float | None = None, model: Path | None = None) -> Motion:
+def load_motion(
+    path: Path,
+    parameters: Parameters,
+    rate_hz: float | None = None,
+    model: Path | None = None,
+    make: Maker = default_state,
+    vocabulary: Vocabulary | None = None,
+) -> Motion:
     """Read the motion of a file: a take of any kind, a recording (.rec), or a script (.toml), which is played.
 
     rate_hz : rows per second; None keeps those of a take, and means 60 for shows and recordings.
     model : network (ONNX) that computes the face from a voice (WAV); see :mod:`controller.takes.voices.network`.
+    make : returns the state that a recording is played into; see :func:`controller.takes.recording.replay`.
+    vocabulary : the named expressions of shows. Default: the shipped ones.
 
     Raises TakeError, ConfigError or ControllerError: the file cannot be read or is wrong.
     """
     if path.suffix.lower() == _SCRIPT:
-        return _resample(path.name, *_play_show(path, parameters), rate_hz or SHOW_HZ)
+        return _resample(path.name, *_play_show(path, parameters, vocabulary), rate_hz or SHOW_HZ)
     if path.suffix == SUFFIX:
-        return _load_recording(path, parameters, rate_hz or SHOW_HZ)
+        return _load_recording(path, parameters, rate_hz or SHOW_HZ, make)
     take = load_take(path, parameters) if model is None else network_take(path, model, parameters)
     times = take.times_s if rate_hz is None else _grid(take.duration_s, rate_hz)
     values = np.array([take.sample(float(t), parameters.neutral()) for t in times])
     return Motion(take.name, *_drop_repeated_times(times, values), take.mask)
 
 
-def _load_recording(path: Path, parameters: Parameters, rate_hz: float) -> Motion:
+def _load_recording(path: Path, parameters: Parameters, rate_hz: float, make: Maker) -> Motion:
     """Return the motion of a recording, with the breath and pupils of its idle motion."""
     states: list[CommandState] = []
 
-    def make(of: Parameters, seed: int, period_s: float) -> CommandState:
-        states.append(CommandState(of, seed=seed, period_s=period_s))
+    def keep(of: Parameters, seed: int, period_s: float) -> CommandState:
+        states.append(make(of, seed, period_s))
         return states[0]
 
-    ticks = [(now_ns * 1e-9, row.copy(), states[0].beside) for now_ns, row in replay(path, parameters, make=make)]
+    ticks = [(now_ns * 1e-9, row.copy(), states[0].beside) for now_ns, row in replay(path, parameters, make=keep)]
     if not ticks:
         raise TakeError(f"{path}: nothing is recorded in it", hint="record it again")
     times, rows, lives = (np.array(column) for column in zip(*ticks, strict=True))
@@ -83,11 +93,11 @@ def _load_recording(path: Path, parameters: Parameters, rate_hz: float) -> Motio
     return replace(motion, lives=np.stack([np.interp(motion.times_s, times, column) for column in lives.T], axis=1))
 
 
-def _play_show(path: Path, parameters: Parameters) -> tuple[Floats, Floats]:
+def _play_show(path: Path, parameters: Parameters, vocabulary: Vocabulary | None) -> tuple[Floats, Floats]:
     """Return times (n,) and values (n, P) of every tick of a show, to its end, or one repetition of a loop."""
     read_toml(path)
-    state = CommandState(parameters)
-    script = load_script(str(path), parameters)
+    state = CommandState(parameters, vocabulary)
+    script = load_script(str(path), parameters, vocabulary)
     show = Show(script, state)
     show.playing = True
     last_s = script.steps[-1][0] if script.steps else 0.0

@@ -49,6 +49,20 @@ def test_heads_that_look_alike_are_a_crowd_and_each_shows_its_own_face(tmp_path:
 
 
 @pytest.mark.slow
+def test_long_hair_sways_where_pictures_have_a_time(tmp_path: Path) -> None:
+    rows = np.zeros((2, 2, len(P)))
+    rows[1, :, P.index("headYaw")] = 0.5
+    shown = list[list[np.ndarray]]()
+    for times in ((0.0, 0.05), (0.0, 0.05), (None, None)):
+        with Wall(stage_of(tmp_path, 'person = "willow"', 'person = "oak"'), P, (192, 80)) as wall:
+            shown.append([wall.pictures(row, None, at_s)[0] for row, at_s in zip(rows, times, strict=True)])
+    (first, swung), (_, again), (same, still) = shown
+    np.testing.assert_array_equal(first, same)
+    np.testing.assert_array_equal(swung, again)
+    assert (swung != still).any()
+
+
+@pytest.mark.slow
 def test_the_newest_face_of_every_head_is_drawn_and_kept(tmp_path: Path) -> None:
     stage = stage_of(tmp_path, 'person = "oak"', "")
     with ExitStack() as stack:

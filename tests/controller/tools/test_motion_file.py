@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,12 +10,15 @@ import pytest
 
 from controller.base.errors import ConfigError, ControllerError, TakeError
 from controller.base.parameters import PARAMETERS as P
+from controller.base.parameters import Parameters
 from controller.layers.commands import CommandState
+from controller.layers.settings import default_layers
 from controller.links.line.script import load_script
 from controller.links.line.show import Show
 from controller.takes.reader import load_take
 from controller.takes.recording import recorded
 from controller.tools.motion_file import Motion, convert, load_motion
+from controller.vocabulary.vocabulary import Vocabulary
 
 JAW = P.index("jawOpen")
 TAKE = "Timecode,BlendShapeCount,JawOpen,EyeBlinkLeft,HeadYaw\n" + "".join(
@@ -85,6 +89,31 @@ def test_a_recording_keeps_breath_and_pupils_of_its_idle_motion(tmp_path: Path) 
     lives = load_motion(tmp_path / "r.rec", P, 100.0).lives
     assert lives is not None and lives[:, 0].max() > 1.0
     np.testing.assert_allclose(lives, shown, atol=1e-9)
+
+
+def test_a_recording_is_played_into_the_layers_that_it_was_recorded_with(tmp_path: Path) -> None:
+    calm = [replace(layer, weight=0.5) for layer in default_layers()]
+
+    def make(parameters: Parameters, seed: int, period_s: float) -> CommandState:
+        return CommandState(parameters, layers=calm, seed=seed, period_s=period_s)
+
+    out = P.neutral()
+    with recorded(make(P, 0, 0.01), tmp_path / "r.rec") as state:
+        state.set_parameters([JAW], [0.6], 1)
+        for k in range(1, 101):
+            state.tick(k * 10_000_000, 0.01, out)
+    assert load_motion(tmp_path / "r.rec", P, make=make).values[-1, JAW] == pytest.approx(0.3)
+    with pytest.raises(ControllerError, match="came out differently"):
+        load_motion(tmp_path / "r.rec", P)
+
+
+def test_a_show_knows_own_expressions(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("[wide]\nweights = { jawOpen = 0.8 }\n")
+    (tmp_path / "s.toml").write_text('steps = ["0 EXPR wide 1"]')
+    own = Vocabulary.load(P, more=[tmp_path / "mine.toml"])
+    assert load_motion(tmp_path / "s.toml", P, vocabulary=own).values[-1, JAW] == pytest.approx(0.8, abs=0.01)
+    with pytest.raises(ConfigError, match="unknown expression 'wide'"):
+        load_motion(tmp_path / "s.toml", P)
 
 
 def test_what_cannot_be_converted_is_named(tmp_path: Path) -> None:
