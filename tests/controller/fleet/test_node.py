@@ -361,6 +361,7 @@ def test_all_find_each_other_again_when_the_router_comes_back(tmp_path: Path) ->
             until(lambda: len({follower.highest for follower in followers}) == 1)
 
 
+@pytest.mark.slow
 def test_endpoints_and_files_that_cannot_be_used_are_named(
     hub: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -147,6 +147,7 @@ def test_what_is_not_finite_never_gets_through(face: Face) -> None:
     assert np.isfinite(values).all() and values[JAW] == pytest.approx(0.5, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_hostile_sources_in_many_threads_keep_every_limit() -> None:
     face = Face()
     stop = threading.Event()

@@ -117,6 +117,7 @@ def test_servos_are_held_where_they_are_until_the_face_begins(servos: SimulatedB
     assert not servos.servo(1).torque and not servos.servo(2).torque
 
 
+@pytest.mark.slow
 def test_the_report_counts_commands_limits_rules_and_differences(servos: SimulatedBus) -> None:
     face = Face()
     face.values[[JAW, YAW]] = 1.0

@@ -105,6 +105,7 @@ def test_what_has_no_texture_is_left_to_paint_and_the_note_says_what_has_one() -
     assert made(Material(), Material(texture=b"damaged"), None)[:2] == (None, [])
 
 
+@pytest.mark.slow
 def test_a_picture_that_would_become_too_large_is_made_smaller_or_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     large = Material(texture=_large(), mime="image/jpeg")
     texture, *_ = made(large, material(BROWN), None)

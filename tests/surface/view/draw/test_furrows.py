@@ -67,6 +67,7 @@ def test_folds_of_a_smile_are_darker_and_redder_from_the_front(
     assert edges < 0.6 * less[..., 1].max(), "soft at the sides"
 
 
+@pytest.mark.slow
 def test_every_way_to_draw_agrees(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     found = [darker(folder, monkeypatch, SMILE | {"browInnerUp": 1.0}, **way)[..., 1] for way in WAYS]  # type: ignore[arg-type]
     whole, off = found[0].sum(), [np.abs(less - found[0]).sum() / found[0].sum() for less in found]
