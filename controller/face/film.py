@@ -76,7 +76,8 @@ def draw_film(
     Raises ViewError: see :func:`surface.view.pictures.clip.write_clip`, or OpenGL is missing.
     """
     draw = _head_pictures if still.wall is None else _wall_pictures
-    return write_clip(_counted(draw(still, rows, lives, fps), len(rows), progress), out, fps=fps, sound=sound)
+    pictures = _counted(draw(still, rows, lives, fps), len(rows), progress)
+    return write_clip(pictures, out, fps=fps, sound=sound, count=len(rows))
 
 
 def _counted(pictures: Iterator[Image], total: int, progress: Callable[[int, int], None]) -> Iterator[Image]:

@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import subprocess
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sized
 from contextlib import suppress
-from itertools import chain, count
+from itertools import chain, takewhile
+from itertools import count as counting
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from surface.base import ffmpeg
 from surface.base.errors import ViewError
-from surface.view.pictures.imagefile import as_image, replacing
-
-if TYPE_CHECKING:
-    from PIL.Image import Image  # imported lazily: few runs write pictures
+from surface.view.pictures.imagefile import replacing
 
 SUFFIXES = (".webp", ".gif", ".mp4")
 _FPS = 0.01, 1000.0
@@ -29,11 +27,19 @@ _WEBP_QUALITY = 80
 _MESSAGE_BYTES = 400  # of ffmpeg's output, its end
 
 
-def write_clip(frames: Iterable[np.ndarray], path: str | Path, *, fps: float = 25.0, sound: Path | None = None) -> int:
+def write_clip(
+    frames: Iterable[np.ndarray],
+    path: str | Path,
+    *,
+    fps: float = 25.0,
+    sound: Path | None = None,
+    count: int | None = None,
+) -> int:
     """Write frames as a clip; the suffix chooses the format (.webp, .gif, .mp4).
 
-    frames : (height, width, 3) uint8 each, all of one size; taken one by one for .mp4, kept until the end for others.
+    frames : (height, width, 3) uint8 each, all of one size; taken one by one.
     fps : frames per second, 0.01 to 1000; a GIF shows 50 at most and leaves out what is more.
+    count : how many frames there are, where they have no length; unknown, a .webp and a .gif keep them until the end.
     sound : file whose sound the clip has (.mp4), from its beginning, cut or silent at the end.
 
     Returns how many frames were given.
@@ -58,7 +64,7 @@ def write_clip(frames: Iterable[np.ndarray], path: str | Path, *, fps: float = 2
         if suffix == ".mp4":
             _write_mp4(temporary, counted, fps, sound)
         else:
-            _write_pillow(temporary, counted, fps)
+            _write_pillow(temporary, counted, fps, len(frames) if isinstance(frames, Sized) else count)
     return counted.count
 
 
@@ -81,30 +87,28 @@ class _CheckedFrames:
             yield frame
 
 
-def _write_pillow(path: Path, frames: _CheckedFrames, fps: float) -> None:
-    """WebP or GIF, by the path's suffix."""
-    suffix, durations = path.suffix.lower(), list[int]()
-    images = _timed(frames, _shown(fps, _TICK_MS[suffix], _LEAST_TICKS[suffix]), durations)
-    options: dict[str, Any] = {"loop": 0, "duration": durations}  # which grows as Pillow takes the frames
+def _write_pillow(path: Path, frames: Iterable[np.ndarray], fps: float, count: int | None) -> None:
+    """WebP or GIF, by the path's suffix, of so many frames; they are kept only where ``count`` is None."""
+    from surface.view.pictures.reel import Reel  # imports Pillow, which few runs need
+
+    if count is None:
+        frames = list(frames)
+        count = len(frames)
+    given, suffix = iter(frames), path.suffix.lower()
+    shown = list(takewhile(lambda place: place[0] < count, _shown(fps, _TICK_MS[suffix], _LEAST_TICKS[suffix])))
+    options: dict[str, Any] = {"save_all": True, "loop": 0, "duration": [duration_ms for _, duration_ms in shown]}
     if suffix == ".webp":
         options |= {"quality": _WEBP_QUALITY, "method": 2, "minimize_size": False}
-    next(images).save(path, save_all=True, append_images=images, **options)
-
-
-def _timed(frames: Iterable[np.ndarray], shown: Iterator[tuple[int, int]], durations: list[int]) -> Iterator[Image]:
-    """The frames that are shown, after their duration was added to ``durations``."""
-    wanted, duration_ms = next(shown)
-    for index, frame in enumerate(frames):
-        if index == wanted:
-            durations.append(duration_ms)
-            yield as_image(frame)
-            wanted, duration_ms = next(shown)
+    wanted = {index for index, _ in shown}
+    Reel((frame for index, frame in enumerate(given) if index in wanted), len(shown)).save(path, **options)
+    for _ in given:  # those after the last that is shown are counted, too
+        pass
 
 
 def _shown(fps: float, tick_ms: int, least: int) -> Iterator[tuple[int, int]]:
     """(index, duration in ms) of every frame that is shown: none for less than some ticks, and all keep the rate."""
     begin, index = 0, 0
-    for other in count(1):
+    for other in counting(1):
         end = round(1000.0 * other / fps / tick_ms)
         if end - begin >= least:
             yield index, (end - begin) * tick_ms

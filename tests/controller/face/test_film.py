@@ -75,7 +75,7 @@ def test_every_row_is_a_picture_at_its_time(monkeypatch: pytest.MonkeyPatch) -> 
     rows, lives = np.zeros((3, 1, len(P))), np.array([[[1.0, 0.1]], [[2.0, -0.1]], [[3.0, 0.0]]])
     rows[:, 0, JAW], rows[:, 0, YAW] = (0.0, 0.5, 1.0), (0.1, 0.2, 0.3)
     count = film.draw_film(still, rows, lives, Path("a.mp4"), 4.0, Path("a.wav"), lambda *done: told.append(done))
-    assert count == 3 and written == [(Path("a.mp4"), {"fps": 4.0, "sound": Path("a.wav")})]
+    assert count == 3 and written == [(Path("a.mp4"), {"fps": 4.0, "sound": Path("a.wav"), "count": 3})]
     assert told == [(1, 3), (2, 3), (3, 3)]
     assert swayed == [(0.1, 0.0), (0.2, 0.25), (0.3, 0.5)]
     assert lived == [(1.0, 0.1), (2.0, -0.1), (3.0, 0.0)]

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import time
 import wave
+import weakref
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -26,9 +27,11 @@ def frames(count: int, size: tuple[int, int] = (48, 32)) -> Iterator[np.ndarray]
 
 
 @pytest.mark.parametrize("suffix", [".webp", ".gif"])
-def test_pillow_formats_keep_frames_and_rate(tmp_path: Path, suffix: str) -> None:
+@pytest.mark.parametrize("given", ["known", "unknown", "list"])
+def test_pillow_formats_keep_frames_and_rate(tmp_path: Path, suffix: str, given: str) -> None:
     path = tmp_path / f"clip{suffix}"
-    assert write_clip(frames(7), path, fps=20.0) == 7
+    made = list(frames(7)) if given == "list" else frames(7)
+    assert write_clip(made, path, fps=20.0, count=7 if given == "known" else None) == 7
     with Image.open(path) as clip:
         assert clip.n_frames == 7
         assert clip.size == (48, 32)
@@ -63,12 +66,41 @@ def durations(path: Path) -> list[int]:
 )
 def test_a_clip_runs_at_its_rate(tmp_path: Path, suffix: str, fps: float, shown: list[int], total_ms: int) -> None:
     path = tmp_path / f"clip{suffix}"
-    assert write_clip(frames(12, (64, 32)), path, fps=fps) == 12
+    assert write_clip(frames(12, (64, 32)), path, fps=fps, count=12) == 12
     told = durations(path)
     assert sum(told) == pytest.approx(total_ms, abs=20)
     assert set(told) <= set(shown)
     if suffix == ".webp" or fps in (30.0, 120.0):
         assert len(told) == len(shown)
+
+
+@pytest.mark.parametrize("suffix", [".webp", ".gif"])
+def test_frames_of_a_known_number_are_taken_one_by_one(tmp_path: Path, suffix: str) -> None:
+    made: list[weakref.ref[np.ndarray]] = []
+    most = 0
+
+    def counted() -> Iterator[np.ndarray]:
+        nonlocal most
+        for frame in frames(11):
+            own = frame.copy()
+            made.append(weakref.ref(own))
+            most = max(most, sum(ref() is not None for ref in made))
+            yield own
+            del own
+
+    assert write_clip(counted(), tmp_path / f"clip{suffix}", count=11) == 11
+    assert most <= 3, "of which one is the first, whose size the others are compared with"
+    with Image.open(tmp_path / f"clip{suffix}") as clip:
+        assert clip.n_frames == 11
+
+
+def test_fewer_frames_than_were_said_leave_the_old_clip(tmp_path: Path) -> None:
+    write_clip(frames(3), tmp_path / "clip.webp")
+    before = (tmp_path / "clip.webp").read_bytes()
+    with pytest.raises(ViewError, match="ends after 3 frames of 5"):
+        write_clip(frames(3), tmp_path / "clip.webp", count=5)
+    assert (tmp_path / "clip.webp").read_bytes() == before
+    assert len(list(tmp_path.iterdir())) == 1
 
 
 def test_a_clip_of_one_frame(tmp_path: Path) -> None:
