@@ -25,6 +25,7 @@ CURLED_MM = (
 )
 ENDS_MM = 16.0  # of a parting, over which it is closed by hair at either end
 NOT_BARE_MM = 4.0  # from the parting, where strand.frag shows no skin
+_WARM = 0.8
 THROUGH = 0.8  # of the skin between roots of hair that is light, which lets light through and shows less on it
 
 
@@ -126,6 +127,7 @@ def _colour_below(part: HeadPart, garments: Sequence[Garment]) -> None:
             below = SCALP * np.asarray(garment.worn.colour, np.float32)
             darker = np.clip(1.0 - below.mean() / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3), 0.0, 1.0)
             share = cover * (1.0 - THROUGH * (1.0 - darker))
+            below = _WARM * below.mean() * albedo / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3) + (1.0 - _WARM) * below
             albedo = albedo + share * (below - albedo)
             for name, less in (("occlusion", SHADED), ("gloss", 1.0)):  # what hair covers does not shine
                 if name in part.attributes:
