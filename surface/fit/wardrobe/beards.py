@@ -8,9 +8,9 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import resampled
-from surface.fit.wardrobe.patches import Patches, greville
+from surface.fit.wardrobe.patches import BARE, Patches, greville
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import BARE, step
+from surface.fit.wardrobe.styles import step
 
 #: By the angle from the front, degrees, about the vertical through (0, 20): the beard's upper and lower line, mm, and
 #: the upper line of its part below the mouth.
@@ -22,7 +22,7 @@ _BELOW = np.array([-41.0, -41.0, -36.0, -17.0, -11.0, -14.0, -18.0, -17.0, -6.0,
 #: and none lower than the corners of the mouth, since a moustache that hangs over them makes every face look sad.
 _LIP_ANGLES = np.array([0.0, 4.0, 8.0, 12.0, 15.0, 17.5, 20.0, 23.0, 26.0, 30.0, 42.0])
 _LIP_UPPER = np.array([-14.2, -13.2, -12.4, -13.0, -14.2, -15.6, -17.0, -19.0, -21.0, -22.0, -24.0])
-_LIP = np.array([-25.2, -25.2, -25.8, -27.6, -29.6, -32.5, -38.0, -43.0, -46.0, -48.0, -48.0])
+_LIP = np.array([-24.4, -24.8, -25.8, -27.6, -29.6, -32.5, -38.0, -43.0, -46.0, -48.0, -48.0])
 _EDGE_DEG = 90.0
 _LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.2])
 _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips is theirs
@@ -32,8 +32,8 @@ _FIELD_MM = -8.0, 12.0  # inside the beard's lines: where stubble begins, and wh
 _DENSER = 1.28  # hair over the lip, which is too short to lie over what is beside it
 _GROWS_MM, _TIPS_MM, _JOINS_MM = 9.0, 4.2, 15.0  # over which it grows in from above, ends at the lip and in the beard
 _JOINS_DEG = 17.0, 23.0  # of its tips: between these it ends no longer at the lip but in the beard
-_THIN_DEG = 20.0  # over which it thins out to either side
-_LIP_UNEVEN_MM = 1.7  # by how much the first ones differ from lock to lock
+_THIN_DEG = 15.0  # over which it thins out to either side
+_LIP_UNEVEN_MM = 1.7, 0.7  # by how much the first two differ from lock to lock
 _PHILTRUM = 0.26, 4.2  # how much of it the hollow below the nose shows, and over how many mm from the middle
 _WIDE_MM = 11.0  # inside its lines, where a beard is dense
 _LIP_DEG = 42.0  # from the middle, where it ends: in the beard beside the mouth
@@ -101,7 +101,7 @@ def garment(skin: Skin, beard: Beard) -> list[Patches]:
     out = []
     for k, (share, cover) in enumerate(beard.shells):
         out.append(_shell(skin, beard, main, (43, 13), (29, 10), share, cover, k, _WIDE_MM, over_lip=False))
-        out.append(_shell(skin, beard, lip, (33, 9), (17, 5), share, _DENSER * cover, k, _LIP_MM, over_lip=True))
+        out.append(_shell(skin, beard, lip, (29, 9), (15, 5), share, _DENSER * cover, k, _LIP_MM, over_lip=True))
     return out
 
 
@@ -187,7 +187,7 @@ def _reached_over_lip(places: Floats, degrees: Floats, layer: int) -> Floats:
     """(gu, gv) the same over the lip, at places (gu, gv, 3) along hairs whose tips lie at angles (gu,): it grows in and
     ends softly, goes over into the beard beside the mouth and shows the hollow below the nose."""
     random = np.random.default_rng(17 + layer)
-    begins, ends = (_LIP_UNEVEN_MM * random.uniform(-1.0, 1.0, (len(places), 1)) for _ in range(2))
+    begins, ends = (far * random.uniform(-1.0, 1.0, (len(places), 1)) for far in _LIP_UNEVEN_MM)
     steps = np.linalg.norm(np.diff(places, axis=1), axis=2)
     along = np.concatenate([np.zeros((len(places), 1)), np.cumsum(steps, axis=1)], axis=1)
     tips = _TIPS_MM + (_JOINS_MM - _TIPS_MM) * step(np.abs(degrees), *_JOINS_DEG)[:, None]

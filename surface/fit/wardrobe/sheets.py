@@ -15,10 +15,10 @@ from scipy.interpolate import CubicSpline, make_interp_spline
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import Flow, Thickness, grow, resampled
-from surface.fit.wardrobe.patches import Patches, greville, knots
+from surface.fit.wardrobe.patches import BARE, Patches, greville, knots
 from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.skin import Skin, unit
-from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, denser, step, thinned
+from surface.fit.wardrobe.styles import ACROSS, ALONG, denser, step, thinned
 
 _CLUMPS_MM = 13.0  # how wide clumps of locks are, which are brighter or darker and end sooner or later than others
 _CLUMPED = 0.4  # by how much the length differs, over which strands of clumps end one after the other

@@ -7,9 +7,8 @@ import pytest
 
 from surface.fit.wardrobe import beards as module
 from surface.fit.wardrobe.beards import BEARDS, field, garment, inside
-from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.patches import BARE, Patches
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import BARE
 from tests.surface.fit.wardrobe.invariants import asymmetry, check_patches, heights, points_of
 from tests.surface.fit.wardrobe.made_skin import lower_face
 

@@ -7,10 +7,10 @@ import pytest
 from scipy.interpolate import BSpline
 
 from surface.fit.wardrobe import sheets as module
-from surface.fit.wardrobe.patches import Patches, knots
+from surface.fit.wardrobe.patches import BARE, Patches, knots
 from surface.fit.wardrobe.sheets import Comb, Layer, Weave, sheet, sheets
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, tangent
+from surface.fit.wardrobe.styles import ACROSS, ALONG, tangent
 from tests.surface.fit.wardrobe.invariants import check_patches
 
 WEAVE = Weave((9, 6), (17, 11), (5, 3))
