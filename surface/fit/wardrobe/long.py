@@ -31,7 +31,7 @@ _WAVE_MM, _WAVE_DEEP_MM = 88.0, 3.4  # how long waves of hair that hangs are, an
 _TURNS_IN_MM = 30.0, 9.0  # of its end, that turns in, and by how much
 RAGGED_MM = 1.5  # by how much locks differ in length: more is a hem torn, not cut
 STRAYS = Strays(15, 5.0, (0.02, 0.97))  # of either side
-FRAYED = 0.09, 0.0  # of the width, at the face and behind
+FRAYED_MM, FRAYED_Y = (9.0, 24.0), (20.0, 70.0)  # over which strands grow sparse beside the cheek and at the temple; mm
 LAYERS = (
     Layer(1.07, 0.46, 1.0, 56.0, 0.1), Layer(1.0, 0.70, 0.90, 42.0, 0.1), Layer(0.84, 1.6, 0.72, 26.0),
 )  # fmt: skip
@@ -64,6 +64,12 @@ def _inner_last(hanging: list[Patches]) -> list[Patches]:
     """Sheets of both sides, the outermost first."""
     each = len(hanging) // 2
     return [patch for pair in zip(hanging[:each], hanging[each:], strict=True) for patch in pair]
+
+
+def _at_face(at: Floats) -> Floats:
+    """(n,) mm over which strands grow sparse at places (n, 3) of the edge beside the face: there is hair below it at the
+    temple alone, and few strands before a cheek look like dots."""
+    return np.asarray(FRAYED_MM[0] + (FRAYED_MM[1] - FRAYED_MM[0]) * step(at[:, 1], *FRAYED_Y))
 
 
 def _at_ear(at: Floats) -> Floats:
@@ -152,7 +158,7 @@ def _curtain(skin: Skin, line: Hairline, side: float) -> list[Patches]:
         Weave((37, 16), (49, 25), (25, 13)),
         seed=21,
         sway=0.75,
-        frayed=FRAYED if side < 0.0 else FRAYED[::-1],
+        edges=(_at_face, None) if side < 0.0 else (None, _at_face),
     )
 
 
