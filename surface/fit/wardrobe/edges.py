@@ -8,11 +8,11 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import Thickness
-from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.patches import BARE, Patches
 from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.styles import thinned
 
-_WANDERS = 0.35  # of an edge's width, by how much it wanders at most
+_WANDERS = 0.3  # by how much cover at an edge differs along it
 _WAVES = (34.0, 1.0), (18.0, 0.8), (10.3, 0.6)  # along strands, in which it does: how long, mm, and how far
 _ASLANT = 0.7  # of the way along strands, by which they are out of step across them
 _BARED = 0.9  # of the light that sheets above keep from an edge, what reaches it where they fray: else it is dark
@@ -33,6 +33,7 @@ def frayed(made: Patches, edges: Edges, share: float, random: np.random.Generato
     for width, away, line in zip(edges, (across, across[-1] - across), at[[0, -1]], strict=True):
         if width is not None:
             left = away / (share * width(line)) - _WANDERS * _wandering(away, along, random)
+            left = np.where(away > 0.0, left, -BARE)
             cover[:] = thinned(cover, left)
             opened += _BARED * np.sqrt(1.0 - np.clip(left, 0.0, 1.0)) * (1.0 - opened)
     return replace(made, strands=strands)

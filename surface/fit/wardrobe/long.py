@@ -17,6 +17,7 @@ PART_X = 14.0  # of the parting, mm
 WANDERS_MM = (0.7, 61.0, 0.6), (0.25, 27.0, 2.1)  # how far it wanders to either side, over which length, begun where
 BEGINS_MM = 8.5  # inside the hairline, where the parting does and with it the sheets: before them lies the under-cap
 AT_PARTING = 0.22  # share of the hair's thickness at the parting: roots lie in a shallow valley, not beside a slot
+CROWN_Z = 5.0, 50.0  # mm: behind the first and up to the other that valley is filled: it would be a notch in the outline
 APART_MM = 0.05  # of either side's roots from the parting's middle: more would be a slot with the cap's edge in it
 ALONG_PART, FANNED = 25, 12  # guides that begin along the parting, and at its end behind
 TIPS_Y, SHORTER_MM = (
@@ -31,7 +32,7 @@ _WAVE_MM, _WAVE_DEEP_MM = 88.0, 3.4  # how long waves of hair that hangs are, an
 _TURNS_IN_MM = 30.0, 9.0  # of its end, that turns in, and by how much
 RAGGED_MM = 1.5  # by how much locks differ in length: more is a hem torn, not cut
 STRAYS = Strays(15, 5.0, (0.02, 0.97))  # of either side
-FRAYED_MM, FRAYED_Y = (9.0, 24.0), (20.0, 70.0)  # over which strands grow sparse beside the cheek and at the temple; mm
+FRAYED_MM, FRAYED_Y = (9.0, 20.0), (20.0, 70.0)  # over which strands grow sparse beside the cheek and at the temple; mm
 LAYERS = (
     Layer(1.07, 0.46, 1.0, 56.0, 0.1), Layer(1.0, 0.70, 0.90, 42.0, 0.1), Layer(0.84, 1.6, 0.72, 26.0),
 )  # fmt: skip
@@ -53,8 +54,8 @@ def long(skin: Skin) -> Style:
 
 
 def _full(line: Hairline, at: Floats) -> Floats:
-    """(n,) mm that hair adds over places (n, 3): less at the line, and at the parting."""
-    beside = step(np.abs(at[:, 0] - PART_X), 0.0, 30.0) + step(-at[:, 2], 30.0, 60.0)
+    """(n,) mm that hair adds over places (n, 3): less at the line, and at the parting before the crown."""
+    beside = step(np.abs(at[:, 0] - PART_X), 0.0, 30.0) + step(-at[:, 2], *(-z for z in reversed(CROWN_Z)))
     return np.asarray(
         9.5 * step(line.inside(at), -8.0, 34.0) * (AT_PARTING + (1.0 - AT_PARTING) * np.minimum(beside, 1.0))
     )

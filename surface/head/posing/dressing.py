@@ -23,7 +23,7 @@ SHADED = 0.6  # of the light that falls on skin between roots, what hair keeps f
 CURLED_MM = (
     40.0  # of strands for a tile of their texture: where it is shorter, strands turn, and none has one direction
 )
-ENDS_MM = 16.0  # of a parting, over which it is closed by hair at either end
+ENDS_MM = 16.0, 32.0  # of a parting, over which hair closes it at its front end, and before its highest place
 NOT_BARE_MM = 4.0  # from the parting, where strand.frag shows no skin
 _WARM = 0.8
 THROUGH = 0.8  # of the skin between roots of hair that is light, which lets light through and shows less on it
@@ -83,7 +83,8 @@ def _show_parting(part: HeadPart, garment: Garment, others: Iterable[HeadPart]) 
 
 
 def _parting_closed(part: HeadPart, patch: NDArray[np.int_]) -> Floats:
-    """(m,) how closed the parting is at the strand of each vertex, 0..1: hair closes over it towards either end.
+    """(m,) how closed the parting is at the strand of each vertex, 0..1: hair closes over it towards its front end and
+    from its highest place on, where skin would be seen as a notch in the head's outline.
 
     patch : (m,) which sheet each vertex belongs to. Its rows run along the parting, its columns away from it.
     """
@@ -93,9 +94,10 @@ def _parting_closed(part: HeadPart, patch: NDArray[np.int_]) -> Floats:
         own = np.flatnonzero(patch == each)
         roots = own[v[own] == v[own].min()]
         roots = roots[np.argsort(u[roots])]
-        steps = np.linalg.norm(np.diff(part.vertices[roots].astype(float), axis=0), axis=1)
-        along = np.concatenate([[0.0], np.cumsum(steps)])
-        left = np.minimum(along, along[-1] - along) / ENDS_MM  # of the way to the nearer end
+        at = part.vertices[roots].astype(float)
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(at, axis=0), axis=1))])
+        before = along if at[0, 2] > at[-1, 2] else along[-1] - along  # mm from the front end
+        left = np.minimum(before / ENDS_MM[0], (before[at[:, 1].argmax()] - before) / ENDS_MM[1])
         closed[own] = np.interp(u[own], u[roots], 1.0 - np.clip(left, 0.0, 1.0))
     return closed
 
