@@ -35,6 +35,7 @@ _JOINS_DEG = 17.0, 23.0  # of its tips: between these it ends no longer at the l
 _THIN_DEG = 15.0  # over which it thins out to either side
 _LIP_UNEVEN_MM = 1.7, 0.7  # by how much the first two differ from lock to lock
 _PHILTRUM = 0.26, 4.2  # how much of it the hollow below the nose shows, and over how many mm from the middle
+_TIPS = 0.25, 0.55  # of the length of hairs: from the one on they have the colour of tips, however few grow
 _WIDE_MM = 11.0  # inside its lines, where a beard is dense
 _LIP_DEG = 42.0  # from the middle, where it ends: in the beard beside the mouth
 _LIP_MM = 2.6  # the same over the lip
@@ -165,7 +166,7 @@ def _shell(
     strands = np.stack(
         [s * width * _HAIRS + 0.31 * layer, along, cover * reached - BARE * (1.0 - reached), openness], axis=-1
     )
-    tint = np.full((1, gu, gv), share) * reached
+    tint = share * np.maximum(reached, step(t, *_TIPS))[None]  # roots are darker, and tips are not, however few
     locks = np.random.default_rng(91 + layer).standard_normal((gu, 1)).clip(-2.0, 2.0)
     shade = np.broadcast_to(1.0 + _SHADED * locks, (1, gu, gv))
     return Patches(

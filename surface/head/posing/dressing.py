@@ -17,7 +17,7 @@ from surface.head.model.wardrobe import HINT, Garment, WornPart
 from surface.head.posing.part import HeadPart, Turn
 
 COVERED = 0.5  # of the picture of hidden skin: more is not drawn
-SCALP = 0.6  # of hair's colour on the skin between its roots, where little light reaches
+SCALP = 0.6  # of hair's brightness on the skin between its roots, where little light reaches
 ALONG_MM = 900.0  # of strands for a tile of their texture along them, as surface.fit.wardrobe makes them
 SHADED = 0.6  # of the light that falls on skin between roots, what hair keeps from it: else it shines grey
 CURLED_MM = (
@@ -25,7 +25,7 @@ CURLED_MM = (
 )
 ENDS_MM = 16.0, 32.0  # of a parting, over which hair closes it at its front end, and before its highest place
 NOT_BARE_MM = 4.0  # from the parting, where strand.frag shows no skin
-_WARM = 0.8
+SKIN = 0.8  # of the hue of skin between roots, what is its own: with that of grey hair it would look bluish
 THROUGH = 0.8  # of the skin between roots of hair that is light, which lets light through and shows less on it
 
 
@@ -126,10 +126,10 @@ def _colour_below(part: HeadPart, garments: Sequence[Garment]) -> None:
     for garment in garments:
         cover = sample_picture(garment, "cover", part)
         if cover is not None:
-            below = SCALP * np.asarray(garment.worn.colour, np.float32)
-            darker = np.clip(1.0 - below.mean() / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3), 0.0, 1.0)
-            share = cover * (1.0 - THROUGH * (1.0 - darker))
-            below = _WARM * below.mean() * albedo / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3) + (1.0 - _WARM) * below
+            hair = SCALP * np.asarray(garment.worn.colour, np.float32)
+            dark = hair.mean() / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3)  # as dark as hair is
+            share = cover * (1.0 - THROUGH * np.minimum(dark, 1.0))
+            below = hair + SKIN * (dark * albedo - hair)
             albedo = albedo + share * (below - albedo)
             for name, less in (("occlusion", SHADED), ("gloss", 1.0)):  # what hair covers does not shine
                 if name in part.attributes:
