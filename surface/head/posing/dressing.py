@@ -127,9 +127,9 @@ def _colour_below(part: HeadPart, garments: Sequence[Garment]) -> None:
         cover = sample_picture(garment, "cover", part)
         if cover is not None:
             hair = SCALP * np.asarray(garment.worn.colour, np.float32)
-            dark = hair.mean() / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3)  # as dark as hair is
-            share = cover * (1.0 - THROUGH * np.minimum(dark, 1.0))
-            below = hair + SKIN * (dark * albedo - hair)
+            dark = np.minimum(hair.mean() / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3), 1.0)
+            share = cover * (1.0 - THROUGH * dark)
+            below = hair + SKIN * (dark * albedo - hair)  # as dark as the hair, and light hair makes no skin lighter
             albedo = albedo + share * (below - albedo)
             for name, less in (("occlusion", SHADED), ("gloss", 1.0)):  # what hair covers does not shine
                 if name in part.attributes:
