@@ -24,10 +24,10 @@ _LIP_ANGLES = np.array([0.0, 4.0, 8.0, 12.0, 15.0, 17.5, 20.0, 23.0, 26.0, 30.0,
 _LIP_UPPER = np.array([-14.2, -13.2, -12.4, -13.0, -14.2, -15.6, -17.0, -19.0, -21.0, -22.0, -24.0])
 _LIP = np.array([-24.4, -24.8, -25.8, -27.6, -29.6, -32.5, -38.0, -43.0, -46.0, -48.0, -48.0])
 _EDGE_DEG = 90.0
-_LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.2])
+_LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 9.0])
 _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips is theirs
 _LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
-_SOONER, _SOONER_DEG = 2.0, (30.0, 50.0)  # it is so many times sooner dense beside the mouth, up to these angles
+_SOONER, _SOONER_DEG = 2.3, (30.0, 50.0)  # it is so many times sooner dense beside the mouth, up to these angles
 _FIELD_MM = -8.0, 12.0  # inside the beard's lines: where stubble begins, and where it is dense
 _DENSER = 1.28  # hair over the lip, which is too short to lie over what is beside it
 _GROWS_MM, _TIPS_MM, _JOINS_MM = 9.0, 4.2, 15.0  # over which it grows in from above, ends at the lip and in the beard
@@ -161,7 +161,7 @@ def _shell(
     if over_lip:
         reached = _reached_over_lip(places, _LIP_DEG * (1.0 - 2.0 * s[:, 0]), layer)
     else:
-        reached = _reached(places.reshape(-1, 3), full_mm, share).reshape(gu, gv) * step(t, 0.0, 0.1)
+        reached = _reached(places.reshape(-1, 3), full_mm, share).reshape(gu, gv) * step(t, 0.0, 0.05)
     along = (t * length - _ROOTS_MM * _SHORTER * np.exp(-t * length / _ROOTS_MM)) / beard.grain
     strands = np.stack(
         [s * width * _HAIRS + 0.31 * layer, along, cover * reached - BARE * (1.0 - reached), openness], axis=-1
