@@ -17,7 +17,7 @@ PART_X = 14.0  # of the parting, mm
 WANDERS_MM = (0.7, 61.0, 0.6), (0.25, 27.0, 2.1)  # how far it wanders to either side, over which length, begun where
 BEGINS_MM = 8.5  # inside the hairline, where the parting does and with it the sheets: before them lies the under-cap
 AT_PARTING = 0.22  # share of the hair's thickness at the parting: roots lie in a shallow valley, not beside a slot
-CROWN_Z = 5.0, 50.0  # mm: behind the first and up to the other that valley is filled: it would be a notch in the outline
+CROWN_Z = 5.0, 50.0  # mm: behind the first that valley is filled, before the other not: the outline would be notched
 APART_MM = 0.05  # of either side's roots from the parting's middle: more would be a slot with the cap's edge in it
 ALONG_PART, FANNED = 25, 12  # guides that begin along the parting, and at its end behind
 TIPS_Y, SHORTER_MM = (
@@ -68,8 +68,8 @@ def _inner_last(hanging: list[Patches]) -> list[Patches]:
 
 
 def _at_face(at: Floats) -> Floats:
-    """(n,) mm over which strands grow sparse at places (n, 3) of the edge beside the face: there is hair below it at the
-    temple alone, and few strands before a cheek look like dots."""
+    """(n,) mm over which strands grow sparse at places (n, 3) of the edge beside the face: below it there is hair at
+    the temple alone, and few strands before a cheek look like dots."""
     return np.asarray(FRAYED_MM[0] + (FRAYED_MM[1] - FRAYED_MM[0]) * step(at[:, 1], *FRAYED_Y))
 
 
