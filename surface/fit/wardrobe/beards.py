@@ -192,7 +192,7 @@ def _reached_over_lip(places: Floats, degrees: Floats, layer: int) -> Floats:
     steps = np.linalg.norm(np.diff(places, axis=1), axis=2)
     along = np.concatenate([np.zeros((len(places), 1)), np.cumsum(steps, axis=1)], axis=1)
     tips = _TIPS_MM + (_JOINS_MM - _TIPS_MM) * step(np.abs(degrees), *_JOINS_DEG)[:, None]
-    grown = step(along + begins, -0.3, _GROWS_MM) * step(along[:, -1:] - along + ends, 0.0, tips)
+    grown = step(along + begins, -0.3, _GROWS_MM) * step((along[:, -1:] - along + ends) / tips, 0.0, 1.0)
     thinner = step(_LIP_DEG - np.abs(degrees), 0.0, _THIN_DEG)[:, None]
     return np.asarray(grown * thinner * (1.0 - _PHILTRUM[0] * np.exp(-((places[..., 0] / _PHILTRUM[1]) ** 2))))
 

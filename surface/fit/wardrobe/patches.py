@@ -126,7 +126,7 @@ def _one_kind(p: Patches, skin: Skin) -> dict[str, Array]:
 def _grown(triangles: Ints, p: Patches) -> Ints:
     """The triangles (t, 3) but for those where no hair grows, which show nothing and cost time."""
     cover = p.strands[..., 2].reshape(-1)
-    return triangles[(cover[triangles] > -BARE).any(axis=1)]
+    return triangles[(cover[triangles] > 1e-3 - BARE).any(axis=1)]
 
 
 def _cells(p: Patches) -> tuple[Ints, Ints]:
