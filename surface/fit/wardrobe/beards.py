@@ -18,16 +18,16 @@ _ANGLES = np.array([0.0, 8.0, 15.0, 20.0, 24.0, 32.0, 45.0, 60.0, 75.0, 87.0, 95
 _UPPER = np.array([-14.0, -12.5, -13.6, -15.0, -17.0, -20.5, -23.5, -21.5, -8.0, 12.0, 14.0])
 _LOWER = np.array([-94.0, -94.0, -93.0, -92.0, -90.0, -88.0, -84.0, -76.0, -60.0, -32.0, -4.0])
 _BELOW = np.array([-41.0, -41.0, -36.0, -17.0, -11.0, -14.0, -18.0, -17.0, -6.0, 12.0, 14.0])
-#: The same of the moustache, at its own angles: roots from the nose outwards, tips along the border of the upper lip,
-#: and none lower than the corners of the mouth, since a moustache that hangs over them makes every face look sad.
+#: The same of the moustache, at its own angles: roots from the nose outwards, tips along the border of the upper lip
+#: and beside the corners of the mouth, not over them: a moustache that hangs over them makes every face look sad.
 _LIP_ANGLES = np.array([0.0, 4.0, 8.0, 12.0, 15.0, 17.5, 20.0, 23.0, 26.0, 30.0, 42.0])
 _LIP_UPPER = np.array([-14.2, -13.2, -12.4, -13.0, -14.2, -15.6, -17.0, -19.0, -21.0, -22.0, -24.0])
-_LIP = np.array([-24.4, -24.8, -25.8, -27.6, -29.6, -32.5, -38.0, -43.0, -46.0, -48.0, -48.0])
+_LIP = np.array([-24.4, -24.8, -25.8, -27.6, -29.6, -31.8, -35.5, -40.0, -43.5, -46.0, -46.0])
 _EDGE_DEG = 90.0
-_LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 9.0])
+_LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([26.0, 9.0])
 _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips is theirs
 _LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
-_SOONER, _SOONER_DEG = 2.3, (30.0, 50.0)  # it is so many times sooner dense beside the mouth, up to these angles
+_SOONER, _SOONER_DEG = 2.6, (30.0, 50.0)  # it is so many times sooner dense beside the mouth, up to these angles
 _FIELD_MM = -8.0, 12.0  # inside the beard's lines: where stubble begins, and where it is dense
 _DENSER = 1.28  # hair over the lip, which is too short to lie over what is beside it
 _GROWS_MM, _TIPS_MM, _JOINS_MM = 9.0, 4.2, 15.0  # over which it grows in from above, ends at the lip and in the beard
