@@ -8,33 +8,36 @@ import numpy as np
 
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import resampled
-from surface.fit.wardrobe.patches import Patches, greville
+from surface.fit.wardrobe.patches import BARE, Patches, greville
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import BARE, step
+from surface.fit.wardrobe.styles import step
 
 #: By the angle from the front, degrees, about the vertical through (0, 20): the beard's upper and lower line, mm, and
 #: the upper line of its part below the mouth.
 _ANGLES = np.array([0.0, 8.0, 15.0, 20.0, 24.0, 32.0, 45.0, 60.0, 75.0, 87.0, 95.0])
-_UPPER = np.array([-14.0, -12.5, -13.6, -18.0, -22.5, -24.5, -26.0, -23.0, -8.0, 12.0, 14.0])
+_UPPER = np.array([-14.0, -12.5, -13.6, -15.0, -17.0, -20.5, -23.5, -21.5, -8.0, 12.0, 14.0])
 _LOWER = np.array([-94.0, -94.0, -93.0, -92.0, -90.0, -88.0, -84.0, -76.0, -60.0, -32.0, -4.0])
-_BELOW = np.array([-42.0, -42.0, -41.0, -34.0, -25.0, -23.0, -26.0, -23.0, -8.0, 12.0, 14.0])
-#: The same of the moustache, at its own angles: roots from the nose outwards, tips along the border of the upper lip,
-#: and none lower than the corners of the mouth, since a moustache that hangs over them makes every face look sad.
-_LIP_ANGLES = np.array([0.0, 4.0, 8.0, 15.0, 20.0, 24.0, 29.0])
-_LIP_UPPER = np.array([-14.2, -13.6, -12.8, -14.2, -17.5, -21.5, -26.0])
-_LIP = np.array([-25.4, -25.2, -25.6, -27.2, -29.4, -31.0, -32.4])
+_BELOW = np.array([-41.0, -41.0, -36.0, -17.0, -11.0, -14.0, -18.0, -17.0, -6.0, 12.0, 14.0])
+#: The same of the moustache, at its own angles: roots from the nose outwards, tips along the border of the upper lip
+#: and beside the corners of the mouth, not over them: a moustache that hangs over them makes every face look sad.
+_LIP_ANGLES = np.array([0.0, 4.0, 8.0, 12.0, 15.0, 17.5, 20.0, 23.0, 26.0, 30.0, 42.0])
+_LIP_UPPER = np.array([-14.2, -13.2, -12.4, -13.0, -14.2, -15.6, -17.0, -19.0, -21.0, -22.0, -24.0])
+_LIP = np.array([-24.4, -24.8, -25.8, -27.6, -29.6, -31.8, -35.5, -40.0, -43.5, -46.0, -46.0])
 _EDGE_DEG = 90.0
-_LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([28.0, 10.2])
+_LIPS, _LIP_RADII = np.array([0.0, -33.0]), np.array([26.0, 9.0])
 _MOUTH_DEPTH = 76.0  # nearer to the front, skin between the lines of the lips is theirs
 _LATER = 0.5  # of the depth at which a shell is dense: so much further inside the longest hairs begin
+_SOONER, _SOONER_DEG = 2.6, (30.0, 50.0)  # it is so many times sooner dense beside the mouth, up to these angles
 _FIELD_MM = -8.0, 12.0  # inside the beard's lines: where stubble begins, and where it is dense
 _DENSER = 1.28  # hair over the lip, which is too short to lie over what is beside it
-_GROWS, _TIPS = 0.5, 0.34  # of the way from nose to lip, over which it grows in from above and ends below
-_THIN = 0.27  # of its width, over which it thins out to either end
-_LIP_UNEVEN = 0.06  # by how much the first two of these differ from lock to lock
+_GROWS_MM, _TIPS_MM, _JOINS_MM = 9.0, 4.2, 15.0  # over which it grows in from above, ends at the lip and in the beard
+_JOINS_DEG = 17.0, 23.0  # of its tips: between these it ends no longer at the lip but in the beard
+_THIN_DEG = 15.0  # over which it thins out to either side
+_LIP_UNEVEN_MM = 1.7, 0.7  # by how much the first two differ from lock to lock
 _PHILTRUM = 0.26, 4.2  # how much of it the hollow below the nose shows, and over how many mm from the middle
+_TIPS = 0.25, 0.55  # of the length of hairs: from the one on they have the colour of tips, however few grow
 _WIDE_MM = 11.0  # inside its lines, where a beard is dense
-_LIP_DEG = 26.0  # from the middle, where it ends: at the corners of the mouth
+_LIP_DEG = 42.0  # from the middle, where it ends: in the beard beside the mouth
 _LIP_MM = 2.6  # the same over the lip
 _SHADED = 0.14  # by how much locks differ in brightness
 _FAN = 0.42  # by how much narrower the moustache's roots lie than its tips: hairs lie outwards from the middle
@@ -65,13 +68,23 @@ BEARDS = {
 
 def inside(points: Floats) -> Floats:
     """(n,) how far inside the beard's lines places on the face (n, 3) lie, mm; negative outside."""
-    y, z, angle = points[:, 1], points[:, 2], _angle(points)
+    return np.asarray(_inside_each(points).min(axis=0))
+
+
+def _inside_each(points: Floats) -> Floats:
+    """(4, n) the same of each line: the upper one, that round the lips, the lower one, the end at the ear."""
+    y, angle = points[:, 1], _angle(points)
     upper, lower = np.interp(angle, _ANGLES, _UPPER), np.interp(angle, _ANGLES, _LOWER)
+    return np.stack([upper - y, _beside_lips(points), y - lower, _BEHIND * (_EDGE_DEG - 2.0 - angle)])
+
+
+def _beside_lips(points: Floats) -> Floats:
+    """(n,) mm from the line round the lips, negative within it."""
     away = points[:, :2] - _LIPS
     out = np.maximum(np.linalg.norm(away / _LIP_RADII, axis=1), 1e-6)
     beside = np.linalg.norm(away, axis=1) * (1.0 - 1.0 / out)
-    lips = np.where(z > _MOUTH_DEPTH, np.where(out < 1.0, _LIP_RADII[1] * (out - 1.0), beside), 50.0)
-    return np.asarray(np.minimum.reduce([upper - y, y - lower, lips, _BEHIND * (_EDGE_DEG - 2.0 - angle)]))
+    lips = np.where(out < 1.0, _LIP_RADII[1] * (out - 1.0), beside)
+    return np.asarray(np.where(points[:, 2] > _MOUTH_DEPTH, lips, 50.0))
 
 
 def _angle(points: Floats) -> Floats:
@@ -83,13 +96,13 @@ def garment(skin: Skin, beard: Beard) -> list[Patches]:
     """Shells, the outermost first: those of cheeks, jaw and chin, and those of the upper lip."""
     wide = _EDGE_DEG * (1.0 - 2.0 * greville(31, 2))  # so that the outside is outside
     main = _grid(skin, wide, np.interp(np.abs(wide), _ANGLES, _BELOW), np.interp(np.abs(wide), _ANGLES, _LOWER), 11)
-    narrow = _LIP_DEG * (1.0 - 2.0 * greville(13, 2))
+    narrow = _LIP_DEG * (1.0 - 2.0 * greville(19, 2))
     top = np.interp((1.0 - _FAN) * np.abs(narrow), _LIP_ANGLES, _LIP_UPPER)
-    lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _LIP_ANGLES, _LIP), 5, _FAN)
+    lip = _grid(skin, narrow, top, np.interp(np.abs(narrow), _LIP_ANGLES, _LIP), 6, _FAN)
     out = []
     for k, (share, cover) in enumerate(beard.shells):
         out.append(_shell(skin, beard, main, (43, 13), (29, 10), share, cover, k, _WIDE_MM, over_lip=False))
-        out.append(_shell(skin, beard, lip, (19, 6), (10, 4), share, _DENSER * cover, k, _LIP_MM, over_lip=True))
+        out.append(_shell(skin, beard, lip, (29, 9), (15, 5), share, _DENSER * cover, k, _LIP_MM, over_lip=True))
     return out
 
 
@@ -146,15 +159,14 @@ def _shell(
     s, t = np.meshgrid(s, t, indexing="ij")
     openness = 0.72 + 0.28 * share + 0.0 * s
     if over_lip:
-        openness = 0.9 * openness
-        reached = _reached_over_lip(places[..., 0], s, t, layer)
+        reached = _reached_over_lip(places, _LIP_DEG * (1.0 - 2.0 * s[:, 0]), layer)
     else:
-        reached = _reached(places.reshape(-1, 3), full_mm, share).reshape(gu, gv) * step(t, 0.0, 0.1)
+        reached = _reached(places.reshape(-1, 3), full_mm, share).reshape(gu, gv) * step(t, 0.0, 0.05)
     along = (t * length - _ROOTS_MM * _SHORTER * np.exp(-t * length / _ROOTS_MM)) / beard.grain
     strands = np.stack(
         [s * width * _HAIRS + 0.31 * layer, along, cover * reached - BARE * (1.0 - reached), openness], axis=-1
     )
-    tint = np.full((1, gu, gv), share) * reached
+    tint = share * np.maximum(reached, step(t, *_TIPS))[None]  # roots are darker, and tips are not, however few
     locks = np.random.default_rng(91 + layer).standard_normal((gu, 1)).clip(-2.0, 2.0)
     shade = np.broadcast_to(1.0 + _SHADED * locks, (1, gu, gv))
     return Patches(
@@ -166,18 +178,23 @@ def _shell(
 def _reached(places: Floats, full_mm: float, share: float) -> Floats:
     """(n,) how much of a shell's hairs grow at places on the skin (n, 3): fewer towards the beard's lines, and the
     longer they are, the later."""
-    deep = inside(places) - _LATER * full_mm * share + _wandering(places)
+    each = _inside_each(places)
+    each[:2] *= _SOONER - (_SOONER - 1.0) * step(_angle(places), *_SOONER_DEG)
+    deep = each.min(axis=0) - _LATER * full_mm * share + _wandering(places)
     return step(deep, -0.3 * full_mm, 1.2 * full_mm)
 
 
-def _reached_over_lip(x: Floats, s: Floats, t: Floats, layer: int) -> Floats:
-    """(gu, gv) the same over the lip, at shares s of its width and t of the way from nose to lip: it grows in and ends
-    softly, thins out towards the corners of the mouth and shows the hollow below the nose."""
+def _reached_over_lip(places: Floats, degrees: Floats, layer: int) -> Floats:
+    """(gu, gv) the same over the lip, at places (gu, gv, 3) along hairs whose tips lie at angles (gu,): it grows in and
+    ends softly, goes over into the beard beside the mouth and shows the hollow below the nose."""
     random = np.random.default_rng(17 + layer)
-    begins, ends = (_LIP_UNEVEN * random.uniform(-1.0, 1.0, (len(s), 1)) for _ in range(2))
-    grown = step(t + begins, -0.05, _GROWS) * (1.0 - step(t + ends, 1.0 - _TIPS, 1.0))
-    thinner = step(np.minimum(s, 1.0 - s), 0.0, _THIN) * (1.0 - _PHILTRUM[0] * np.exp(-((x / _PHILTRUM[1]) ** 2)))
-    return np.asarray(grown * thinner)
+    begins, ends = (far * random.uniform(-1.0, 1.0, (len(places), 1)) for far in _LIP_UNEVEN_MM)
+    steps = np.linalg.norm(np.diff(places, axis=1), axis=2)
+    along = np.concatenate([np.zeros((len(places), 1)), np.cumsum(steps, axis=1)], axis=1)
+    tips = _TIPS_MM + (_JOINS_MM - _TIPS_MM) * step(np.abs(degrees), *_JOINS_DEG)[:, None]
+    grown = step(along + begins, -0.3, _GROWS_MM) * step((along[:, -1:] - along + ends) / tips, 0.0, 1.0)
+    thinner = step(_LIP_DEG - np.abs(degrees), 0.0, _THIN_DEG)[:, None]
+    return np.asarray(grown * thinner * (1.0 - _PHILTRUM[0] * np.exp(-((places[..., 0] / _PHILTRUM[1]) ** 2))))
 
 
 def _wandering(places: Floats) -> Floats:

@@ -17,6 +17,7 @@ PART_X = 14.0  # of the parting, mm
 WANDERS_MM = (0.7, 61.0, 0.6), (0.25, 27.0, 2.1)  # how far it wanders to either side, over which length, begun where
 BEGINS_MM = 8.5  # inside the hairline, where the parting does and with it the sheets: before them lies the under-cap
 AT_PARTING = 0.22  # share of the hair's thickness at the parting: roots lie in a shallow valley, not beside a slot
+CROWN_Z = 5.0, 50.0  # mm: behind the first that valley is filled, before the other not: the outline would be notched
 APART_MM = 0.05  # of either side's roots from the parting's middle: more would be a slot with the cap's edge in it
 ALONG_PART, FANNED = 25, 12  # guides that begin along the parting, and at its end behind
 TIPS_Y, SHORTER_MM = (
@@ -31,7 +32,7 @@ _WAVE_MM, _WAVE_DEEP_MM = 88.0, 3.4  # how long waves of hair that hangs are, an
 _TURNS_IN_MM = 30.0, 9.0  # of its end, that turns in, and by how much
 RAGGED_MM = 1.5  # by how much locks differ in length: more is a hem torn, not cut
 STRAYS = Strays(15, 5.0, (0.02, 0.97))  # of either side
-FRAYED = 0.09, 0.0  # of the width, at the face and behind
+FRAYED_MM, FRAYED_Y = (9.0, 20.0), (20.0, 70.0)  # over which strands grow sparse beside the cheek and at the temple; mm
 LAYERS = (
     Layer(1.07, 0.46, 1.0, 56.0, 0.1), Layer(1.0, 0.70, 0.90, 42.0, 0.1), Layer(0.84, 1.6, 0.72, 26.0),
 )  # fmt: skip
@@ -53,8 +54,8 @@ def long(skin: Skin) -> Style:
 
 
 def _full(line: Hairline, at: Floats) -> Floats:
-    """(n,) mm that hair adds over places (n, 3): less at the line, and at the parting."""
-    beside = step(np.abs(at[:, 0] - PART_X), 0.0, 30.0) + step(-at[:, 2], 30.0, 60.0)
+    """(n,) mm that hair adds over places (n, 3): less at the line, and at the parting before the crown."""
+    beside = step(np.abs(at[:, 0] - PART_X), 0.0, 30.0) + step(-at[:, 2], *(-z for z in reversed(CROWN_Z)))
     return np.asarray(
         9.5 * step(line.inside(at), -8.0, 34.0) * (AT_PARTING + (1.0 - AT_PARTING) * np.minimum(beside, 1.0))
     )
@@ -64,6 +65,12 @@ def _inner_last(hanging: list[Patches]) -> list[Patches]:
     """Sheets of both sides, the outermost first."""
     each = len(hanging) // 2
     return [patch for pair in zip(hanging[:each], hanging[each:], strict=True) for patch in pair]
+
+
+def _at_face(at: Floats) -> Floats:
+    """(n,) mm over which strands grow sparse at places (n, 3) of the edge beside the face: below it there is hair at
+    the temple alone, and few strands before a cheek look like dots."""
+    return np.asarray(FRAYED_MM[0] + (FRAYED_MM[1] - FRAYED_MM[0]) * step(at[:, 1], *FRAYED_Y))
 
 
 def _at_ear(at: Floats) -> Floats:
@@ -152,7 +159,7 @@ def _curtain(skin: Skin, line: Hairline, side: float) -> list[Patches]:
         Weave((37, 16), (49, 25), (25, 13)),
         seed=21,
         sway=0.75,
-        frayed=FRAYED if side < 0.0 else FRAYED[::-1],
+        edges=(_at_face, None) if side < 0.0 else (None, _at_face),
     )
 
 

@@ -11,6 +11,8 @@ from surface.base.arrays import Array, Floats, Ints
 from surface.fit.wardrobe.skin import Skin
 
 APART = 2.0  # between patches, in u
+#: How far below nothing cover is where no hair grows: strand.frag fades it, and the tallest strands reach 0.3.
+BARE = 0.5
 _CELL = 12  # rows of vertices along u in a cell of the mesh: only the points that reach them are in its list
 _MADE = (0.0, 1.0, 1.0)  # a budget that nothing else makes: the mesh is the file's own
 
@@ -115,10 +117,16 @@ def _one_kind(p: Patches, skin: Skin) -> dict[str, Array]:
         "strands": p.strands.reshape(-1, 4), "tint": p.tint.reshape(-1), "shade": p.shade.reshape(-1),
         "mesh_uv": uv, "mesh_side": np.tile(side.ravel(), k),
         "mesh_triangles": (first + _triangles(p.grid, p.grid)).reshape(-1, 3),
-        "fast": (first + _triangles(p.grid, p.fast)).reshape(-1, 3),
+        "fast": _grown((first + _triangles(p.grid, p.fast)).reshape(-1, 3), p),
         "mesh_list_ids": (np.arange(k)[:, None] * nu * nv + lists).ravel(),
         "cells": np.tile(sizes, (k, 1)),
     }  # fmt: skip
+
+
+def _grown(triangles: Ints, p: Patches) -> Ints:
+    """The triangles (t, 3) but for those where no hair grows, which show nothing and cost time."""
+    cover = p.strands[..., 2].reshape(-1)
+    return triangles[(cover[triangles] > 1e-3 - BARE).any(axis=1)]
 
 
 def _cells(p: Patches) -> tuple[Ints, Ints]:

@@ -14,11 +14,12 @@ import numpy as np
 from scipy.interpolate import CubicSpline, make_interp_spline
 
 from surface.base.arrays import Floats
+from surface.fit.wardrobe.edges import Edges, frayed
 from surface.fit.wardrobe.guides import Flow, Thickness, grow, resampled
-from surface.fit.wardrobe.patches import Patches, greville, knots
+from surface.fit.wardrobe.patches import BARE, Patches, greville, knots
 from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.skin import Skin, unit
-from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, denser, step, thinned
+from surface.fit.wardrobe.styles import ACROSS, ALONG, denser, step, thinned
 
 _CLUMPS_MM = 13.0  # how wide clumps of locks are, which are brighter or darker and end sooner or later than others
 _CLUMPED = 0.4  # by how much the length differs, over which strands of clumps end one after the other
@@ -28,10 +29,8 @@ _CLOSER = 0.45  # how much less light reaches cropped hairs, which lie on the sk
 _CROPPED = 20.0  # how many times shorter the pieces are that one sees of cropped hairs
 _UNEVEN = 0.35  # by how much the length that is roots differs along a hairline: an even one looks cut as with a saw
 _AT_EAR, _EAR_MM = 0.65, 30.0  # by how much narrower a soft edge is over the ears, and how far off them
-_EDGE_BARE = 0.2  # how far below nothing cover is at a frayed edge: single strands there look like threads of a web
 _BACKED = 0.6  # how much less of the innermost sheet frays: skin between the strands of an edge is a dotted line
 _LINE_WANDERS_MM = 0.9  # by which hair grows in sooner or later along a soft line: more are tufts
-_BARED = 0.9  # of the light that sheets above keep from an edge, what reaches it where they fray: else it is dark
 Drape = Callable[[Floats], Floats]
 """Guides (g, k, 3), hung."""
 Depth = Callable[[Floats], Floats]
@@ -105,13 +104,13 @@ class Weave:
 
 def sheets(
     skin: Skin, comb: Comb, layers: tuple[Layer, ...], weave: Weave, *, seed: int, closed: bool = False,
-    sway: float = 0.0, frayed: tuple[float, float] = (0.0, 0.0),
+    sway: float = 0.0, edges: Edges = (None, None),
 ) -> list[Patches]:  # fmt: skip
     """Sheets along the guides of a comb, the outermost first.
 
     All of them bulge in the same places: the inner ones would come through the outer ones otherwise.
 
-    closed : does the last guide meet the first? frayed : over which share of u strands grow sparse at either edge.
+    closed : does the last guide meet the first? edges : over how many mm strands grow sparse at either edge.
     """
     out, bulges = [], _waves(len(comb.roots), np.random.default_rng(seed), closed)
     for k, layer in enumerate(layers):
@@ -119,7 +118,7 @@ def sheets(
         paths = _guides(skin, comb, layer, comb.ragged_mm * _waves(len(bulges), random, closed), bulges)
         points = _control_points(paths, weave)
         backed = 1.0 - _BACKED * k / max(len(layers) - 1, 1)
-        made = sheet(points, layer, weave, random, closed, sway, (backed * frayed[0], backed * frayed[1]))
+        made = frayed(sheet(points, layer, weave, random, closed, sway), edges, backed, random)
         out.append(_thinned(made, comb.edge or comb.cut, layer.edge_mm, random) if layer.edge_mm > 0.0 else made)
     return out
 
@@ -205,9 +204,8 @@ def _through(places: Floats, axis: int) -> Floats:
 
 
 def sheet(
-    points: Floats, layer: Layer, weave: Weave, random: np.random.Generator, closed: bool, sway: float,
-    frayed: tuple[float, float] = (0.0, 0.0),
-) -> Patches:  # fmt: skip
+    points: Floats, layer: Layer, weave: Weave, random: np.random.Generator, closed: bool, sway: float
+) -> Patches:
     """One sheet over control points (nu, nv, 3), whose strands run along v; see :func:`sheets`."""
     (nu, nv), (gu, gv) = weave.points, weave.grid
     t = np.broadcast_to(weave.length(np.linspace(0, 1, gv)), (gu, gv))
@@ -223,16 +221,10 @@ def sheet(
     longer = 1.0 - 0.3 * locks.clip(-1, 1) - _CLUMPED * clumps.clip(-1, 1)
     fray = np.minimum(layer.fray_mm * longer / own, 0.9)
     cover = layer.cover * (1.0 + 0.10 * locks) - (layer.cover + BARE) * np.clip((t - 1.0 + fray) / fray, 0.0, 1.0)
-    edge = np.zeros_like(u)
-    for width, away in zip(frayed, (u, 1.0 - u), strict=True):
-        if width > 0.0:
-            edge = np.maximum(edge, 1.0 - np.clip(away / width, 0.0, 1.0))
-    cover = cover - (layer.cover + _EDGE_BARE) * edge
     if layer.roots > 0.0:
         uneven = 1.0 + _UNEVEN * _waves(gu, random, closed)[:, None]
         cover = cover - layer.roots * (1.0 - step(t * own / uneven, 0.0, layer.roots_mm))
     opened = layer.openness * (1.0 - _ROOTED[0] * (1.0 - step(t, 0.0, _ROOTED[1]))) * (1.0 + 0.05 * locks)
-    opened = opened + _BARED * np.sqrt(edge) * (1.0 - opened)
     ends = np.exp(-(1.0 - t) * own / max(layer.cropped_mm, 1e-9))
     opened = opened * (1.0 - _CLOSER * ends) if layer.cropped_mm > 0.0 else opened
     along = start[1] + ALONG * (float(np.median(lengths)) * t + _CROPPED * layer.cropped_mm * ends)

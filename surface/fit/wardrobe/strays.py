@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.wardrobe.patches import Patches, greville
+from surface.fit.wardrobe.patches import BARE, Patches, greville
 from surface.fit.wardrobe.skin import unit
-from surface.fit.wardrobe.styles import ACROSS, ALONG, BARE, step
+from surface.fit.wardrobe.styles import ACROSS, ALONG, step
 
 _POINTS, _GRID, _FAST = (2, 7), (3, 10), (2, 5)  # control points and vertices across and along a fin
 _SUNK_MM = 0.6  # below the sheet, where fins begin, so that no gap is seen under them

@@ -9,15 +9,12 @@ import numpy as np
 from surface.base.arrays import Floats
 from surface.fit.wardrobe.guides import Thickness
 from surface.fit.wardrobe.hairline import Hairline, directions
-from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.patches import BARE, Patches
 from surface.fit.wardrobe.skin import CENTRE, Skin, unit
 
 ACROSS = 1.0 / 46.0  # tiles of the noise for a mm across strands, and along them
 ALONG = 1.0 / 900.0
 _CAP = 2.2  # cover of an under-cap
-BARE = (
-    0.5  # how far below nothing cover is where no hair grows: strand.frag fades it, and the tallest strands reach 0.3
-)
 
 
 @dataclass(frozen=True)

@@ -17,14 +17,15 @@ from surface.head.model.wardrobe import HINT, Garment, WornPart
 from surface.head.posing.part import HeadPart, Turn
 
 COVERED = 0.5  # of the picture of hidden skin: more is not drawn
-SCALP = 0.6  # of hair's colour on the skin between its roots, where little light reaches
+SCALP = 0.6  # of hair's brightness on the skin between its roots, where little light reaches
 ALONG_MM = 900.0  # of strands for a tile of their texture along them, as surface.fit.wardrobe makes them
 SHADED = 0.6  # of the light that falls on skin between roots, what hair keeps from it: else it shines grey
 CURLED_MM = (
     40.0  # of strands for a tile of their texture: where it is shorter, strands turn, and none has one direction
 )
-ENDS_MM = 16.0  # of a parting, over which it is closed by hair at either end
+ENDS_MM = 16.0, 32.0  # of a parting, over which hair closes it at its front end, and before its highest place
 NOT_BARE_MM = 4.0  # from the parting, where strand.frag shows no skin
+SKIN = 0.8  # of the hue of skin between roots, what is its own: with that of grey hair it would look bluish
 THROUGH = 0.8  # of the skin between roots of hair that is light, which lets light through and shows less on it
 
 
@@ -82,7 +83,8 @@ def _show_parting(part: HeadPart, garment: Garment, others: Iterable[HeadPart]) 
 
 
 def _parting_closed(part: HeadPart, patch: NDArray[np.int_]) -> Floats:
-    """(m,) how closed the parting is at the strand of each vertex, 0..1: hair closes over it towards either end.
+    """(m,) how closed the parting is at the strand of each vertex, 0..1: hair closes over it towards its front end and
+    from its highest place on, where skin would be seen as a notch in the head's outline.
 
     patch : (m,) which sheet each vertex belongs to. Its rows run along the parting, its columns away from it.
     """
@@ -92,9 +94,10 @@ def _parting_closed(part: HeadPart, patch: NDArray[np.int_]) -> Floats:
         own = np.flatnonzero(patch == each)
         roots = own[v[own] == v[own].min()]
         roots = roots[np.argsort(u[roots])]
-        steps = np.linalg.norm(np.diff(part.vertices[roots].astype(float), axis=0), axis=1)
-        along = np.concatenate([[0.0], np.cumsum(steps)])
-        left = np.minimum(along, along[-1] - along) / ENDS_MM  # of the way to the nearer end
+        at = part.vertices[roots].astype(float)
+        along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(at, axis=0), axis=1))])
+        before = along if at[0, 2] > at[-1, 2] else along[-1] - along  # mm from the front end
+        left = np.minimum(before / ENDS_MM[0], (before[at[:, 1].argmax()] - before) / ENDS_MM[1])
         closed[own] = np.interp(u[own], u[roots], 1.0 - np.clip(left, 0.0, 1.0))
     return closed
 
@@ -123,9 +126,10 @@ def _colour_below(part: HeadPart, garments: Sequence[Garment]) -> None:
     for garment in garments:
         cover = sample_picture(garment, "cover", part)
         if cover is not None:
-            below = SCALP * np.asarray(garment.worn.colour, np.float32)
-            darker = np.clip(1.0 - below.mean() / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3), 0.0, 1.0)
-            share = cover * (1.0 - THROUGH * (1.0 - darker))
+            hair = SCALP * np.asarray(garment.worn.colour, np.float32)
+            dark = np.minimum(hair.mean() / np.maximum(albedo.mean(axis=1, keepdims=True), 1e-3), 1.0)
+            share = cover * (1.0 - THROUGH * dark)
+            below = hair + SKIN * (dark * albedo - hair)  # as dark as the hair, and light hair makes no skin lighter
             albedo = albedo + share * (below - albedo)
             for name, less in (("occlusion", SHADED), ("gloss", 1.0)):  # what hair covers does not shine
                 if name in part.attributes:

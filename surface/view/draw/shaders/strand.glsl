@@ -1,7 +1,7 @@
 // How strands of hair answer the lights, after Kajiya and Kay, "Rendering fur with three dimensional textures" (1989),
 // with the two highlights of Marschner et al., "Light scattering from human hair fibers" (2003): one of the surface,
 // shifted towards the root, and one of light that went through the fibre, coloured and shifted towards the tip.
-#define SURFACE vec2(0.075, 10.0)     // shift, 1 / width, of the sine of the angle half way
+#define SURFACE vec2(0.075, 16.0)     // shift, 1 / width, of the sine of the angle half way
 #define THROUGH vec2(-0.13, 4.6)
 
 vec3 strand_diffuse(vec3 n, vec3 t, vec3 v, float open) {

@@ -7,9 +7,8 @@ import pytest
 
 from surface.fit.wardrobe import beards as module
 from surface.fit.wardrobe.beards import BEARDS, field, garment, inside
-from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.patches import BARE, Patches
 from surface.fit.wardrobe.skin import Skin
-from surface.fit.wardrobe.styles import BARE
 from tests.surface.fit.wardrobe.invariants import asymmetry, check_patches, heights, points_of
 from tests.surface.fit.wardrobe.made_skin import lower_face
 
@@ -120,14 +119,17 @@ def test_a_moustache_grows_in_softly_and_shows_the_hollow_below_the_nose(
         assert half[middle] < 0.9 * half[middle - 4 : middle + 5].max()
 
 
-def test_a_moustache_ends_at_the_upper_lip_and_no_lower_than_the_corners_of_the_mouth(
+def test_a_moustache_ends_at_the_upper_lip_and_beside_the_mouth_in_the_beard(
     made: dict[str, list[Patches]], name: str
 ) -> None:
-    for lip in made[name][1::2]:
-        lower = lip.points[0, :, -1, 1]
-        assert lower[len(lower) // 2] == pytest.approx(module._LIPS[1] + 8.0, abs=1.5)
-        assert lower.min() > module._LIPS[1] - 0.5, "it hangs over them"
+    for main, lip in zip(made[name][::2], made[name][1::2], strict=True):
+        x, y, _ = lip.points[0, :, -1].T
+        assert y[len(y) // 2] == pytest.approx(module._LIPS[1] + 8.0, abs=1.5)
+        assert (y[np.abs(x) < 20.0] > module._LIPS[1]).all(), "it hangs over the mouth"
+        assert (y[np.abs(x) > 34.0] < module._LIPS[1] - 8.0).all() and np.abs(x).max() > 40.0
         assert (np.diff(lip.points[0, :, :, 1]) < 0.0).all()
+        beside = np.abs(main.points[0, :, 0, 0]) < 45.0, np.abs(main.points[0, :, 0, 0]) > 30.0
+        assert (main.points[0, beside[0] & beside[1], 0, 1] > module._LIPS[1] + 8.0).all(), "there is a gap"
 
 
 def test_hairs_are_short_where_they_come_out_of_the_skin(made: dict[str, list[Patches]], name: str) -> None:

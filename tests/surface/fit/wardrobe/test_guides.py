@@ -86,7 +86,8 @@ def test_ends_are_ragged_and_strands_sparse_there() -> None:
 
 
 def test_an_edge_that_is_frayed_has_fewer_strands() -> None:
-    (patch,) = sheets(Plane(), comb(), (Layer(1.0, 0.8, 1.0),), WEAVE, seed=3, frayed=(0.3, 0.0))  # type: ignore[arg-type]
+    edges = (lambda at: np.full(len(at), 12.0), None)
+    (patch,) = sheets(Plane(), comb(), (Layer(1.0, 0.8, 1.0),), WEAVE, seed=3, edges=edges)  # type: ignore[arg-type]
     across = patch.strands[0, :, 2, 2]
     assert across[0] < 0.25 < 0.6 < across[-1]
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from surface.fit.wardrobe import __main__ as program
-from surface.fit.wardrobe.beards import BEARDS, garment
 from surface.fit.wardrobe.skin import ANCHORS, Skin
 from surface.head import Head
 
@@ -103,13 +102,3 @@ def test_long_hair_hangs_in_tresses_of_the_shipped_length(
         spread = np.abs(other).max()
         np.testing.assert_allclose(one.mean(axis=0), other.mean(axis=0), atol=0.02 * spread)
         np.testing.assert_allclose(one.std(axis=0), other.std(axis=0), atol=0.02 * spread)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", BEARDS)
-def test_a_moustache_ends_level_with_the_corners_of_the_mouth(name: str, head: Head) -> None:
-    """One that hangs over them makes a face at rest look sad."""
-    corner = next(c for c in head.data.contacts if c.eye < 0).places[0, 0, 0]
-    height = head.part("face").surface.evaluate(corner[None])[0, 1]
-    lip = garment(Skin(head), BEARDS[name])[1].points[0]
-    assert np.abs(lip[..., 0]).max() < 40.0 and lip[..., 1].min() > height - 2.5

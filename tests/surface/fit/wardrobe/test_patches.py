@@ -7,7 +7,7 @@ import pytest
 
 from surface import DCPSurface
 from surface.base.arrays import Floats
-from surface.fit.wardrobe.patches import APART, Patches, arrays, knots
+from surface.fit.wardrobe.patches import APART, BARE, Patches, arrays, knots
 
 
 class Plane:
@@ -109,6 +109,15 @@ def test_triangles_cover_each_sheet_once_and_turn_alike(made: dict[str, np.ndarr
     a, b, c = made["mesh_uv"][made[key]].swapaxes(0, 1)
     area = 0.5 * np.linalg.det(np.stack([b - a, c - a], axis=1))
     assert (area > 0).all() and area.sum() == pytest.approx(5.0)
+
+
+def test_where_no_hair_grows_no_triangle_is_drawn() -> None:
+    patch = sheets(1, (3, 5), (2, 3), (3, 4))
+    patch.strands[0, :2, :, 2], patch.strands[0, 2, :, 2] = -BARE, [-BARE, 0.1, -BARE, -BARE]
+    wanted = {"fast": 0, "mesh_triangles": 12}  # of four corners all are bare; the whole mesh is that of the surface
+    assert {key: len(arrays([patch], Plane())[key]) for key in wanted} == wanted  # type: ignore[arg-type]
+    patch.strands[0, 2, 3, 2] = 0.01 - BARE
+    assert len(arrays([patch], Plane())["fast"]) == 2  # type: ignore[arg-type]
 
 
 def test_what_hair_has_at_its_vertices_and_points_comes_in_their_order(made: dict[str, np.ndarray]) -> None:

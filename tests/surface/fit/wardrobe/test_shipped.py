@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from surface.base.arrays import Floats
 from surface.head import Head
 from surface.head.model.look import Look, Worn
+from surface.head.posing.part import HeadPart
 
 EAR_X, EAR_Y, EAR_Z = 76.0, (-20.0, 32.0), (-20.0, 8.0)
 """A box in an ear, from its lobe to below the top of its rim and from behind its front edge, mm."""
@@ -59,6 +61,51 @@ def test_beards_lie_close_to_the_skin_at_the_ears(root: Path) -> None:
     beard = Dressed(root, "beard-full")
     side = (np.degrees(np.arctan2(np.abs(beard.at[:, 0]), beard.at[:, 2] - 20.0)) > 78.0) & (beard.cover > -0.25)
     assert side.any() and beard.away[side].max() < 3.0
+
+
+POSES = {
+    "rest": {}, "open": {"jawOpen": 1.0}, "smile": {"mouthSmileLeft": 1.0, "mouthSmileRight": 1.0},
+    "pucker": {"mouthPucker": 1.0}, "funnel": {"mouthFunnel": 1.0}, "rolled": {"mouthRollUpper": 1.0},
+    "laugh": {"jawOpen": 0.7, "mouthSmileLeft": 1.0, "mouthSmileRight": 1.0}, "aside": {"mouthLeft": 1.0},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module", params=["beard-full", "beard-short"])
+def bearded(request: pytest.FixtureRequest, root: Path) -> Head:
+    worn = Worn(root / "configs/wardrobe" / f"{request.param}.npz", (0.1, 0.1, 0.1))
+    return Head.load(root / "configs/heads/ict", look=Look(worn=(worn,)))
+
+
+def _moustache(head: Head) -> tuple[NDArray[np.bool_], HeadPart]:
+    """Which vertices of the beard are of the hairs over the lip that show."""
+    beard = head.part("beard")
+    patch = np.floor(np.asarray(beard.uv)[:, 0] / 2.0).astype(int)
+    return (patch % 2 == 1) & (beard.attributes["strands"][:, 2] > 0.3), beard
+
+
+def test_a_moustache_leaves_the_lips_free_and_joins_the_beard(bearded: Head) -> None:
+    shows, beard = _moustache(bearded)
+    face = bearded.part("face")
+    at = beard.vertices.astype(float)
+    lips = face.attributes["lips"][cKDTree(face.vertices).query(at[shows])[1], 0]
+    assert (lips < 0.5).mean() > 0.97
+    grows = cKDTree(at[beard.attributes["strands"][:, 2] > 0.3])
+    for side in (1.0, -1.0):
+        way = np.array([(side * x, y) for x, y in ((20, -22), (26, -25), (31, -29), (34, -34), (36, -40), (36, -48))])
+        _, near = cKDTree(face.vertices[:, :2]).query(way)
+        assert grows.query(face.vertices[near])[0].max() < 6.0, "there is a gap between moustache and beard"
+
+
+@pytest.mark.parametrize("pose", POSES)
+def test_a_moustache_follows_the_lips(bearded: Head, pose: str) -> None:
+    """It neither goes through them nor stands off, however the mouth moves."""
+    shows, beard = _moustache(bearded)
+    bearded.pose(bearded.values(POSES[pose]))
+    face = bearded.part("face")
+    away, near = cKDTree(face.vertices).query(beard.vertices[shows].astype(float))
+    height = ((beard.vertices[shows] - face.vertices[near]) * face.normals[near]).sum(axis=1)
+    bearded.pose(bearded.values({}))
+    assert away.max() < 6.0 and height.min() > -0.6
 
 
 def test_tied_hair_begins_close_to_the_ear(root: Path) -> None:

@@ -8,12 +8,11 @@ from scipy.spatial import cKDTree
 
 from surface.fit.wardrobe.bun import bun
 from surface.fit.wardrobe.long import long
-from surface.fit.wardrobe.patches import Patches
+from surface.fit.wardrobe.patches import BARE, Patches
 from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.short import short, swept, thin
 from surface.fit.wardrobe.skin import Skin
 from surface.fit.wardrobe.strays import Strays, strays
-from surface.fit.wardrobe.styles import BARE
 from tests.surface.fit.wardrobe.invariants import check_patches
 
 RADIUS = 80.0

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from surface.fit.wardrobe.hairline import Hairline
+from surface.fit.wardrobe.patches import BARE
 from surface.fit.wardrobe.skin import CENTRE, Skin
-from surface.fit.wardrobe.styles import BARE, cap, step, tangent, thinned
+from surface.fit.wardrobe.styles import cap, step, tangent, thinned
 from tests.surface.fit.wardrobe.invariants import check_patches, heights, outward_share
 
 

@@ -21,6 +21,7 @@ from surface.head.posing.dressing import (
     NOT_BARE_MM,
     SCALP,
     SHADED,
+    SKIN,
     THROUGH,
     WornMesh,
     dress,
@@ -86,6 +87,8 @@ def test_hair_without_tips_has_one_colour_and_bright_hair_stays_in_range(head: H
 def test_hair_that_hangs_knows_how_far_its_roots_are_and_what_skin_shows_there(head: Head) -> None:
     part, skin = head.part("b"), head.part("a")
     part.material, skin.material = "tress", "skin"
+    u = np.asarray(part.uv)[:, 0] % 2.0  # the parting rises, and falls behind
+    part.vertices = np.column_stack([0.0 * u, -90.0 * (u - 0.6) ** 2, -120.0 * u]).astype(np.float32)
     skin.attributes["albedo"] = np.full((len(skin.vertices), 3), 0.4, np.float32)
     worn = garment(head, {"cover/a": np.ones((2, 2), np.float32)})
     dress(head.parts, [worn])
@@ -98,13 +101,15 @@ def test_hair_that_hangs_knows_how_far_its_roots_are_and_what_skin_shows_there(h
 
 
 def _check_closed(at: np.ndarray, uv: np.ndarray, closed: np.ndarray) -> None:
-    """A parting is closed at both ends, open in between, and along each strand as at its root."""
+    """A parting is closed at its front end and from its highest place on, and along each strand as at its root."""
     roots = np.flatnonzero(uv[:, 1] == uv[:, 1].min())
     roots = roots[np.argsort(uv[roots, 0])]
-    ends = np.minimum(*(np.linalg.norm(at[roots] - at[roots[k]], axis=1) for k in (0, -1)))
-    straight = NOT_BARE_MM * np.clip(1.0 - ends / ENDS_MM, 0.0, 1.0)
-    assert closed[roots[[0, -1]]] == pytest.approx(NOT_BARE_MM)
-    assert (closed[roots] <= straight + 1e-3).all() and closed[roots].min() < 0.8 * NOT_BARE_MM
+    order = roots if at[roots[0], 2] > at[roots[-1], 2] else roots[::-1]  # from the front
+    top = int(at[order, 1].argmax())
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(at[order], axis=0), axis=1))])
+    assert closed[order[[0, *range(top, len(order))]]] == pytest.approx(NOT_BARE_MM, abs=1e-4)
+    left = np.minimum(way[:top] / ENDS_MM[0], (way[top] - way[:top]) / ENDS_MM[1])
+    assert closed[order[:top]] == pytest.approx(NOT_BARE_MM * (1.0 - np.minimum(left, 1.0)), abs=1e-3)
     assert closed == pytest.approx(np.interp(uv[:, 0], uv[roots, 0], closed[roots]), abs=1e-4)
 
 
@@ -129,8 +134,9 @@ def test_skin_below_has_the_colour_of_hair_lies_in_its_shade_and_does_not_shine(
     across = np.tile(np.linspace(0, 1, 3)[:, None], (1, 4))  # a picture that rises with u
     dress(head.parts, [garment(head, {"cover/a": across, "shadow/a": 0.5 * across, "cover/tooth": across})])
     u = skin.uv[:, :1]
-    below = SCALP * np.array([0.8, 0, 0])
-    light = np.minimum(below.mean() / before.mean(axis=1, keepdims=True), 1.0)  # beside the skin
+    hair = SCALP * np.array([0.8, 0, 0])
+    light = np.minimum(hair.mean() / before.mean(axis=1, keepdims=True), 1.0)  # beside the skin
+    below = (1 - SKIN) * hair + SKIN * light * before
     share = u * (1 - THROUGH * light)
     np.testing.assert_allclose(skin.attributes["albedo"], before + share * (below - before), atol=1e-5)
     np.testing.assert_allclose(skin.attributes["occlusion"], 0.8 * (1 - SHADED * share) * (1 - 0.5 * u), atol=1e-5)
