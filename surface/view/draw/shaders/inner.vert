@@ -10,7 +10,8 @@
 
 #define CORNER vec3(0.60, 0.50, 0.44)   // of the light, what lips and cheek leave to teeth at the corners of the mouth
 #define CORNER_AT vec2(0.45, 1.0)       // of the way there: where they begin to shade them, and where they do
-#define BEHIND vec3(0.80, 0.70, 0.64)    // of the light, what the tongue leaves to the inner sides of teeth far back
+#define BEHIND vec3(0.37, 0.30, 0.28)    // of the light, what the tongue leaves to the inner sides of teeth far back
+#define REDDENED 0.30                    // of the walls' colour, what these have of it: they fade into the mouth
 #define WIDE_MM2 vec2(200.0, 900.0)     // of the lips' opening: through a narrow one less of it comes to them
 #define NARROW vec3(0.62, 0.49, 0.43)   // of that, what comes
 #define TONGUE_WET 0.35                  // nothing but a tongue is as wet
@@ -63,10 +64,11 @@ void main() {
     vec3 outwards = normalize(dot(away, side) * side + (past + ARCH_MM) * out_of);
     float inwards = teeth * smoothstep(0.0, 0.5, -dot(n, outwards));
     float behind = teeth * max(deep, inwards * smoothstep(BEHIND_MM.x, BEHIND_MM.y, -past));
-    vec3 own = mix(mix(albedo, GUM, shade.y), WALLS, max(0.06 * inwards, 0.08 * behind));
+    vec3 own = mix(mix(albedo, GUM, shade.y), WALLS, max(0.06 * inwards, REDDENED * behind));
     vec3 own_normal = n;
-    n = normalize(mix(n, out_of, (wetness > TONGUE_WET ? 0.4 : 0.55) * deep));
-    vec3 tint = mix(vec3(1.0), ROUND_WALLS, max(deep, inwards));
+    // Single cusps of far teeth would read as lumps.
+    n = normalize(mix(n, out_of, max((wetness > TONGUE_WET ? 0.4 : 0.55) * deep, 0.9 * behind)));
+    vec3 tint = mix(vec3(1.0), ROUND_WALLS, max(deep, inwards) * (1.0 - 0.3 * teeth));
     vec3 light = key_colour * wrapped(dot(n, key_direction), wrap)
         + fill_colour * wrapped(dot(n, fill_direction), wrap) + 1.6 * ambient(n);
     // A tongue past the lips is in the open.
