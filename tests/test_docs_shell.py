@@ -44,6 +44,7 @@ READERS = {
     "...": "dynamixel", "configs/stages/serial.toml": "serial.toml", "heads/me": "small",
     "myhead.toml": "my-robot.toml", "livelink:127.0.0.1:11111": "livelink:127.0.0.1:27311",
     "my-show.mp4": "my-show.webp", "configs/scripts/tour.toml": "my-show.toml",
+    "configs/scripts/choir.toml": "my-show.toml",
 }  # fmt: skip
 """What only a reader has, and what the test has in its place; the other names are files that the test writes."""
 MORE = {
