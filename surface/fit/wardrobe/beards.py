@@ -43,6 +43,7 @@ _SHADED = 0.14  # by how much locks differ in brightness
 _FAN = 0.42  # by how much narrower the moustache's roots lie than its tips: hairs lie outwards from the middle
 _BEHIND = 0.8  # mm inside the beard's end at the ear for a degree: there it thins out slowly
 _UNEVEN_MM, _UNEVEN_DEG = 1.6, 3.1  # by how much the line at which hairs begin wanders, and how fast
+_WANDERS = np.array([[1.0], [0.25], [1.0], [1.0]])  # of that, each line: round the lips, one bare lock is a nick
 _SIDE_DEG, _SIDE = (45.0, 86.0), 0.85  # between which it gets shorter towards the ear, and by which share
 _HAIRS = 1.0 / 19.0  # tiles of the noise for a mm across hairs
 _ROOTS_MM, _SHORTER = 7.0, 10.0  # from a shell's upper line, where hairs are seen in so many times shorter pieces
@@ -164,7 +165,7 @@ def _shell(
         reached = _reached(places.reshape(-1, 3), full_mm, share).reshape(gu, gv) * step(t, 0.0, 0.05)
     along = (t * length - _ROOTS_MM * _SHORTER * np.exp(-t * length / _ROOTS_MM)) / beard.grain
     strands = np.stack(
-        [s * width * _HAIRS + 0.31 * layer, along, cover * reached - BARE * (1.0 - reached), openness], axis=-1
+        [s * width * _HAIRS + 2.77 * layer, along, cover * reached - BARE * (1.0 - reached), openness], axis=-1
     )
     tint = share * np.maximum(reached, step(t, *_TIPS))[None]  # roots are darker, and tips are not, however few
     locks = np.random.default_rng(91 + layer).standard_normal((gu, 1)).clip(-2.0, 2.0)
@@ -180,7 +181,8 @@ def _reached(places: Floats, full_mm: float, share: float) -> Floats:
     longer they are, the later."""
     each = _inside_each(places)
     each[:2] *= _SOONER - (_SOONER - 1.0) * step(_angle(places), *_SOONER_DEG)
-    deep = each.min(axis=0) - _LATER * full_mm * share + _wandering(places)
+    each += _wandering(places) * _WANDERS
+    deep = each.min(axis=0) - _LATER * full_mm * share
     return step(deep, -0.3 * full_mm, 1.2 * full_mm)
 
 
