@@ -17,7 +17,7 @@
 #define TONGUE_WET 0.35                  // nothing but a tongue is as wet
 #define MIRROR 40.0                     // how sharp the opening of the mouth is mirrored
 #define WET 0.34                        // and how bright
-#define BEHIND_MM vec2(2.0, 22.0)       // behind the lips: where it begins to lie before them, and where it does
+#define BEHIND_MM vec2(14.0, 40.0)       // behind the lips: where it begins to lie before them, and where it does
 
 uniform mat4 view_projection;
 uniform vec3 camera;
