@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.wardrobe.guides import resampled
+from surface.fit.wardrobe.guides import resampled, way
 from surface.fit.wardrobe.patches import BARE, Patches, greville
 from surface.fit.wardrobe.skin import Skin
 from surface.fit.wardrobe.styles import step
@@ -191,8 +191,7 @@ def _reached_over_lip(places: Floats, degrees: Floats, layer: int) -> Floats:
     ends softly, goes over into the beard beside the mouth and shows the hollow below the nose."""
     random = np.random.default_rng(17 + layer)
     begins, ends = (far * random.uniform(-1.0, 1.0, (len(places), 1)) for far in _LIP_UNEVEN_MM)
-    steps = np.linalg.norm(np.diff(places, axis=1), axis=2)
-    along = np.concatenate([np.zeros((len(places), 1)), np.cumsum(steps, axis=1)], axis=1)
+    along = way(places, 1)
     tips = _TIPS_MM + (_JOINS_MM - _TIPS_MM) * step(np.abs(degrees), *_JOINS_DEG)[:, None]
     grown = step(along + begins, -0.3, _GROWS_MM) * step((along[:, -1:] - along + ends) / tips, 0.0, 1.0)
     thinner = step(_LIP_DEG - np.abs(degrees), 0.0, _THIN_DEG)[:, None]

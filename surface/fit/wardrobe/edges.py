@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from surface.base.arrays import Floats
-from surface.fit.wardrobe.guides import Thickness
+from surface.fit.wardrobe.guides import Thickness, way
 from surface.fit.wardrobe.patches import BARE, Patches
 from surface.fit.wardrobe.shade import surface_at
 from surface.fit.wardrobe.styles import thinned
@@ -27,7 +27,7 @@ def frayed(made: Patches, edges: Edges, share: float, random: np.random.Generato
     if edges == (None, None):
         return made
     at = surface_at(made.points[0], made.degrees, [np.linspace(0.0, 1.0, n) for n in made.grid])
-    across, along = _way(at, 0), _way(at, 1)
+    across, along = way(at, 0), way(at, 1)
     strands = made.strands.copy()
     cover, opened = strands[0, ..., 2], strands[0, ..., 3]
     for width, away, line in zip(edges, (across, across[-1] - across), at[[0, -1]], strict=True):
@@ -37,12 +37,6 @@ def frayed(made: Patches, edges: Edges, share: float, random: np.random.Generato
             cover[:] = thinned(cover, left)
             opened += _BARED * np.sqrt(1.0 - np.clip(left, 0.0, 1.0)) * (1.0 - opened)
     return replace(made, strands=strands)
-
-
-def _way(at: Floats, axis: int) -> Floats:
-    """(gu, gv) mm along an axis of a grid of places (gu, gv, 3)."""
-    way = np.cumsum(np.linalg.norm(np.diff(at, axis=axis), axis=2), axis=axis)
-    return np.asarray(np.insert(way, 0, 0.0, axis=axis))
 
 
 def _wandering(across: Floats, along: Floats, random: np.random.Generator) -> Floats:

@@ -45,10 +45,15 @@ def grow(
     return np.stack(paths, axis=1), np.stack(along, axis=1)
 
 
+def way(at: Floats, axis: int) -> Floats:
+    """(n, k) mm from the first of places (n, k, 3) on, along an axis of them, 0 or 1."""
+    steps = np.linalg.norm(np.diff(at, axis=axis), axis=2)
+    return np.asarray(np.insert(np.cumsum(steps, axis=axis), 0, 0.0, axis=axis))
+
+
 def resampled(rows: Floats, count: int, shares: Floats | None = None) -> Floats:
     """(n, count, 3) places along polylines (n, k, 3): evenly, or at shares (count,) of their length."""
-    steps = np.linalg.norm(np.diff(rows, axis=1), axis=2)
-    along = np.concatenate([np.zeros((len(rows), 1)), np.cumsum(steps, axis=1)], axis=1)
+    along = way(rows, 1)
     shares = np.linspace(0.0, 1.0, count) if shares is None else shares
     out = np.empty((len(rows), count, 3))
     for i, (own, at) in enumerate(zip(rows, along, strict=True)):

@@ -55,7 +55,7 @@ def long(skin: Skin) -> Style:
 
 def _full(line: Hairline, at: Floats) -> Floats:
     """(n,) mm that hair adds over places (n, 3): less at the line, and at the parting before the crown."""
-    beside = step(np.abs(at[:, 0] - PART_X), 0.0, 30.0) + step(-at[:, 2], *(-z for z in reversed(CROWN_Z)))
+    beside = step(np.abs(at[:, 0] - PART_X), 0.0, 30.0) + 1.0 - step(at[:, 2], *CROWN_Z)
     return np.asarray(
         9.5 * step(line.inside(at), -8.0, 34.0) * (AT_PARTING + (1.0 - AT_PARTING) * np.minimum(beside, 1.0))
     )

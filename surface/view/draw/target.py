@@ -80,14 +80,9 @@ class Target:
         inner = max(1, round(size[0] * self.scale)), max(1, round(size[1] * self.scale))
         self.texture = ctx.texture(size, 4)
         self.picture = ctx.framebuffer([self.texture])
-        self._raw: moderngl.Texture | None = None
-        self._passes: list[_Pass] = []
-        if single:
-            self._raw = ctx.texture(inner, 4)
-            self._raw.filter = (ctx.NEAREST, ctx.NEAREST)
-            self._passes = _passes(ctx, self._raw, self.picture)
-        many = 0 if single else self.samples
-        colour = self._raw or ctx.renderbuffer(inner, 4, samples=many)
+        raw, many = (ctx.texture(inner, 4), 0) if single else (None, self.samples)
+        self._passes = [] if raw is None else _passes(ctx, raw, self.picture)
+        colour = raw or ctx.renderbuffer(inner, 4, samples=many)
         self._drawn = ctx.framebuffer([colour], ctx.depth_renderbuffer(inner, samples=many))
         self._flush = ctx.framebuffer([ctx.renderbuffer((1, 1), 4)])
         self._last: Bands | None = None
