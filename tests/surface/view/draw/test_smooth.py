@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from surface.view import Camera
+from surface.head import Head
+from surface.view import Camera, Offscreen
 from surface.view.draw.target import Target
 from surface.view.pictures.offscreen import open_context
 from surface.view.scene.bounds import Bands
@@ -117,6 +119,14 @@ def test_within_hair_no_edge_is_followed(ctx: moderngl.Context) -> None:
     steps = DARK + (LIGHT - DARK) * slanted(1 / 9, 1)
     off = np.abs(shown(ctx, steps, STRAND) - steps)
     assert 0.05 < off.max() / (LIGHT - DARK) < 0.32, "half of the neighbours differ where a step ends"
+
+
+def test_what_is_blended_is_no_strand(gl: None, root: Path) -> None:
+    """Lashes and brows are blended with the skin behind them, which has an alpha of 1."""
+    head = Head.load(root / "configs" / "heads" / "ict")
+    with Offscreen(head, (320, 320), samples=1) as screen:
+        screen.render(head.values({}))
+        assert set(screen.target._drawn.read(components=4)[3::4]) == {255}
 
 
 def test_faint_edges_are_smoothed_in_part(ctx: moderngl.Context) -> None:

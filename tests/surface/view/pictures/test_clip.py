@@ -74,6 +74,19 @@ def test_a_clip_runs_at_its_rate(tmp_path: Path, suffix: str, fps: float, shown:
         assert len(told) == len(shown)
 
 
+def test_a_gif_that_leaves_frames_out_shows_each_at_its_time(tmp_path: Path) -> None:
+    """At 120 frames a second every third or second one, and the last not before its time."""
+    write_clip(frames(12, (64, 32)), tmp_path / "clip.gif", fps=120.0, count=12)
+    with Image.open(tmp_path / "clip.gif") as clip:
+        wide = []
+        for index in range(clip.n_frames):
+            clip.seek(index)
+            wide.append(int((np.asarray(clip.convert("RGB"))[16, :, 0] > 110).sum()))
+    shown = [(width - 4) // 4 for width in wide]
+    begins = [round(0.02 * k * 120.0) for k in range(len(shown))]
+    assert np.abs(np.subtract(shown, begins)).max() <= 1 and shown[-1] >= 9
+
+
 @pytest.mark.parametrize("suffix", [".webp", ".gif"])
 def test_frames_of_a_known_number_are_taken_one_by_one(tmp_path: Path, suffix: str) -> None:
     made: list[weakref.ref[np.ndarray]] = []
